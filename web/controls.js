@@ -38,7 +38,8 @@ function dragOf(event) {
  * @param {Place} to
  */
 function degreesAround(middle, from, to) {
-  const angle = (/** @type {Place} */ place) => Math.atan2(middle.y - place.y, place.x - middle.x);  // y of CSS points down
+  // CSS counts y downwards.
+  const angle = (/** @type {Place} */ place) => Math.atan2(middle.y - place.y, place.x - middle.x);
   return (angle(to) - angle(from)) * 180 / Math.PI;
 }
 

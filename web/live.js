@@ -251,7 +251,8 @@ export class Live {
                   `but this page uses version ${STREAM_VERSION}; reload it`);
       return;
     }
-    if (welcome.session !== this.session && !this.isPaused) this.shown = undefined;  // another run numbers its own frames
+    // Another run numbers its own frames.
+    if (welcome.session !== this.session && !this.isPaused) this.shown = undefined;
     this.session = welcome.session;
     this.isServerPaused = false;
     this.series = welcome.series;

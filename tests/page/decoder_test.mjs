@@ -170,9 +170,9 @@ async function testMetadata(/** @type {Uint8Array} */ file) {
 /** Lists of as many supersegments as a run may have: more than a byte counts. */
 async function testDeepLists() {
   const file = join(folder, "deep.vdi");
-  execFileSync(vdi, ["generate", "--field", "shells", "--size", "8x8x16", "--copies", "1x1x40", "--joint", "cells", "--blocks", "1x1x1",
-                     "--azimuth", "0", "--elevation", "0", "--parallel", "--zoom", "40", "--resolution", "12x12",
-                     "--supersegments", "1024", "-o", file], {stdio: "ignore"});
+  execFileSync(vdi, ["generate", "--field", "shells", "--size", "8x8x16", "--copies", "1x1x40", "--joint", "cells",
+                     "--blocks", "1x1x1", "--azimuth", "0", "--elevation", "0", "--parallel", "--zoom", "40",
+                     "--resolution", "12x12", "--supersegments", "1024", "-o", file], {stdio: "ignore"});
   const {budget, offsets} = await decodeVdi(new Uint8Array(readFileSync(file)));
   let most = 0;
   for (let i = 1; i < offsets.length; ++i) most = Math.max(most, offsets[i] - offsets[i - 1]);

@@ -261,7 +261,7 @@ async function testConnection() {
   check(sockets.length === 5 && live.state === "closed", "what was closed stays closed");
 }
 
-/** The decoder takes a level late, when parts of the next one have come: that one's acknowledgements go on. */
+/** The decoder takes a level late, amid the next one: acknowledgements of that one go on. */
 async function testLateDecoder() {
   const {live, sockets} = connection(50);
   sockets[0].open();
@@ -322,7 +322,8 @@ async function testPause() {
     await soon(20);
   };
   const asked = () => socket.sent.filter((m) => m.type === "pause" || m.type === "resume").map((m) => m.type).join();
-  const acks = (/** @type {number} */ frame) => socket.sent.filter((m) => m.type === "ack" && m.frame === frame).length;
+  const acks = (/** @type {number} */ frame) =>
+    socket.sent.filter((m) => m.type === "ack" && m.frame === frame).length;
   const seen = () => shown.splice(0).join();
 
   begin({});

@@ -1,4 +1,5 @@
-// What the page does with hands, pictures and numbers, without a browser: elements, renderer and clock are this test's.
+// What the page does with hands, pictures and numbers, without a browser: elements, renderer and clock are
+// this test's.
 import {toView, basisOf, halfHeightOf} from "../../web/camera.js";
 import {addControls} from "../../web/controls.js";
 import {numberText} from "../../web/legend.js";
@@ -43,15 +44,19 @@ Object.assign(globalThis, {
 });
 
 /** @type {any} */
-const CAMERA = {position: [0, 0, 5], focalPoint: [0, 0, 0], viewUp: [0, 1, 0], viewAngle: 30, parallel: false, parallelScale: 1};
+const CAMERA = {position: [0, 0, 5], focalPoint: [0, 0, 0], viewUp: [0, 1, 0], viewAngle: 30, parallel: false,
+                parallelScale: 1};
 
-/** A viewer of a square canvas, whose renderer notes for each row of its two pictures which camera drew it, and how coarsely. */
+/**
+ * A viewer of a square canvas. Its renderer notes for each row of its two pictures which camera drew it,
+ * and how coarsely.
+ */
 function viewerOf(/** @type {number} */ millisecondsPerPixel) {
   const side = 100;
   const gl = new Proxy({}, {get: (_, name) => /^[A-Z]/.test(String(name)) ? name : () => 1});
   /** @type {any} */
-  const canvas = {width: side, height: side, clientWidth: side, clientHeight: side, getContext: () => gl, addEventListener: () => {},
-                  toBlob: (/** @type {(blob: object) => void} */ take) => take({})};
+  const canvas = {width: side, height: side, clientWidth: side, clientHeight: side,
+                  getContext: () => gl, addEventListener: () => {}, toBlob: (/** @type {(blob: object) => void} */ take) => take({})};
   const viewer = new Viewer(canvas, () => {}, async () => undefined);
   const blank = () => Array(side).fill("");
   let drawn = 0;
@@ -63,7 +68,8 @@ function viewerOf(/** @type {number} */ millisecondsPerPixel) {
     },
     loaded: undefined, smooth: false, canShear: () => false, shown: blank(), next: blank(),
     pictureSize: (/** @type {number} */ scale) => ({width: Math.ceil(side / scale), height: Math.ceil(side / scale)}),
-    drawPicture(/** @type {any} */ camera, /** @type {number} */ scale, /** @type {number} */ first, /** @type {number} */ end) {
+    /** @param {any} camera @param {number} scale @param {number} first @param {number} end */
+    drawPicture(camera, scale, first, end) {
       this.next.fill(`${camera.position[0]} at ${scale}`, first, end);
       drawn = Math.ceil(side / scale) * (end - first);
     },
@@ -74,7 +80,8 @@ function viewerOf(/** @type {number} */ millisecondsPerPixel) {
   viewer.cost = millisecondsPerPixel;
   let rests = 0;
   viewer.onRest = () => void ++rests;
-  const look = (/** @type {number} */ x, /** @type {boolean} */ moving) => viewer.setCamera({...CAMERA, position: [x, 0, 5]}, moving);
+  const look = (/** @type {number} */ x, /** @type {boolean} */ moving) =>
+    viewer.setCamera({...CAMERA, position: [x, 0, 5]}, moving);
   return {viewer, renderer, look, rests: () => rests};
 }
 
@@ -132,7 +139,8 @@ function handsOn(/** @type {number} */ width, /** @type {number} */ height, /** 
     camera: () => camera, center: () => [0, 0, 0], framed: () => framed,
     move: (/** @type {any} */ next) => camera = next,
   }));
-  const point = (/** @type {string} */ name, /** @type {number} */ id, /** @type {number} */ x, /** @type {number} */ y, more = {}) =>
+  /** @param {string} name @param {number} id @param {number} x @param {number} y */
+  const point = (name, id, x, y, more = {}) =>
     listeners.get(name)?.({pointerId: id, clientX: x, clientY: y, button: 0, ...more});
   const place = (/** @type {any} */ world) => {
     const [x, y, z] = toView(world, camera, basisOf(camera));
