@@ -34,14 +34,14 @@ def in_c(name):
 def is_refused_beyond_a_limit():
     """Whether a file beyond the limit of sizes is an error. With the signal's default action it would end the process."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))
-    try:
-        with tempfile.TemporaryFile(buffering=0) as file:
+    with tempfile.TemporaryFile(buffering=0) as file:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (0, before[1]))
+        try:
             file.write(b"x")
-    except OSError as error:
-        return error.errno == errno.EFBIG
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        except OSError as error:
+            return error.errno == errno.EFBIG
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
     return False
 
 
