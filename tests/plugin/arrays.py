@@ -26,9 +26,9 @@ for name, values in arrays.items():
     array.SetName(name)
     image.GetPointData().AddArray(array)
 colors = (np.stack([field, 1 - field, x * x], axis=3) * 255).astype(np.uint8)
-vectors = dict(velocity=np.stack([x, 2 * y, -3 * z], axis=3), rgb=colors)
+vectors = dict(velocity=np.stack([x, 2 * y, -3 * z], axis=3), rgb=colors, complex=np.stack([x, y], axis=3))
 for name, values in vectors.items():
-    array = numpy_to_vtk(values.reshape(-1, 3).copy(), deep=True)
+    array = numpy_to_vtk(values.reshape(-1, values.shape[3]).copy(), deep=True)
     array.SetName(name)
     image.GetPointData().AddArray(array)
 """
@@ -228,6 +228,17 @@ check(range_of(moving.LookupTable) == [-2, 12], "over all time steps %s" % range
 simple.Delete(moving_shown)
 simple.Delete(moving)
 image.SelectInputScalars = ["POINTS", "a"]
+
+# The phase of complex numbers, which ParaView's arrays have no component for.
+image.SelectInputScalars, image.Component = ["POINTS", "complex"], -2
+shown = simple.Show(image, view)
+shown.SetRepresentationType("VDI")
+simple.Render(view)
+image.LookupTable.RescaleTransferFunction(0, 1)
+shown.RescaleTransferFunctionToDataRangeOverTime()
+ends = range_of(image.LookupTable)
+check(ends[0] < -3 and ends[1] == round(np.pi, 4), "the phase has its range over all time steps %s" % ends)
+image.SelectInputScalars, image.Component = ["POINTS", "a"], -1
 
 # After a state file.
 state = os.path.join(OUTPUT, "arrays.pvsm")

@@ -15,10 +15,12 @@
 #include <vtkSMTransferFunctionProxy.h>
 #include <vtkScalarsToColors.h>
 
+#include <numbers>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/Metadata.h"
 #include "vtkSMVDIGeneratorProxy.h"
@@ -179,11 +181,14 @@ bool vtkSMVDIRepresentationProxy::RescaleTransferFunctionToDataRangeOverTime(con
   vtkPVArrayInformation* array =
       port->GetTemporalDataInformation()->GetArrayInformation(scalars.GetAsString(4), scalars.GetAsInt(3));
   if (array == nullptr) return false;
-  double range[2];
+  double range[2] = {-std::numbers::pi, std::numbers::pi};
   const int wanted = vtkSMPropertyHelper(generator, "Component").GetAsInt();
   const int components = array->GetNumberOfComponents();
-  if (components > 1 && wanted >= components) return false;
-  array->GetComponentFiniteRange(components > 1 ? wanted : 0, range);
+  // ParaView knows the ranges of the components and of the magnitude. It crashes when it is asked for others.
+  if (wanted != vdi::phase || components != 2) {
+    if (components > 1 && (wanted < vdi::magnitude || wanted >= components)) return false;
+    array->GetComponentFiniteRange(components > 1 ? wanted : 0, range);
+  }
   if (!(range[0] <= range[1])) return false;
   vtkSMCoreUtilities::AdjustRange(range);
   vtkSMTransferFunctionProxy::RescaleTransferFunction(proxyOf(this, "LookupTable"), range);

@@ -31,7 +31,8 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkSMVDIRepresentationProxy
   void ViewUpdated(vtkSMProxy* view) override;
 
   using vtkSMPVRepresentationProxy::RescaleTransferFunctionToDataRangeOverTime;
-  /// Takes the range over time from the filter's input, so that time steps needn't become VDIs for it.
+  /// Takes the range over time from the filter's input, so that time steps needn't become VDIs for it. From
+  /// ParaView 5.12 on, toolbar and editor don't call it: their helper makes the VDI of each step.
   bool RescaleTransferFunctionToDataRangeOverTime(const char* arrayname, int attribute_type) override;
 
  protected:
