@@ -238,6 +238,13 @@ image.LookupTable.RescaleTransferFunction(0, 1)
 shown.RescaleTransferFunctionToDataRangeOverTime()
 ends = range_of(image.LookupTable)
 check(ends[0] < -3 and ends[1] == round(np.pi, 4), "the phase has its range over all time steps %s" % ends)
+image.LookupTable.RescaleTransferFunction(0, 1)
+shown.RescaleTransferFunctionToDataRange(False, True)
+ends = range_of(image.LookupTable)
+check(ends[0] < -3 and ends[1] == round(np.pi, 4), "and that of the data, which aren't folded %s" % ends)
+table = image.LookupTable.SMProxy.ComputeDataHistogramTable(2)
+bins = [table.GetColumn(1).GetValue(i) for i in range(2)]
+check(0.8 < bins[0] / bins[1] < 1.25, "nor is their histogram %s" % bins)
 image.SelectInputScalars, image.Component = ["POINTS", "a"], -1
 
 # After a state file.

@@ -13,6 +13,7 @@
 #include <cstring>
 
 #include "vdi/comm/Communicator.h"
+#include "vdi/core/ComponentValues.h"
 
 namespace pv {
 
@@ -77,7 +78,8 @@ void setShownValues(vtkImageData* image, const vdi::ScalarArray& array, std::spa
   if (array.name.empty() || array.name.starts_with("VDI.") || values.empty()) return;
   vtkNew<vtkDoubleArray> shown;
   shown->SetName(array.name.c_str());
-  shown->SetNumberOfComponents(array.components);
+  // No component is the phase. ParaView takes the magnitude, which of a single component is the value itself.
+  shown->SetNumberOfComponents(array.component == vdi::phase ? 1 : array.components);
   shown->SetNumberOfTuples(static_cast<vtkIdType>(values.size()));
   shown->Fill(0.0);
   const int component = std::max(array.component, 0);

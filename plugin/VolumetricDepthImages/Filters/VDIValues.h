@@ -24,7 +24,8 @@ std::vector<double> sampleOf(std::span<const vdi::Block> blocks, const vdi::Scal
 
 /// Adds the values to the image's field data, as a double array with the name and the number of components of
 /// the original array. The shown component holds the values; the others are 0. So the array's ranges, of that
-/// component or of the magnitude, are those of the shown values. Without a name or values it adds nothing.
+/// component or of the magnitude, are those of the shown values. Phases are an array of one component.
+/// Without a name or values it adds nothing.
 void setShownValues(vtkImageData* image, const vdi::ScalarArray& array, std::span<const double> values);
 /// The same for both ends of the coloring's range, if it has one. A VDI that was made elsewhere has only
 /// these.
