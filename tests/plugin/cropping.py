@@ -58,8 +58,20 @@ for name, shade in (("unshaded", 0), ("shaded", 1)):
     vdi_bounds = np.array(image.GetDataInformation().GetBounds())
     write_png("cropping_%s.png" % name, np.hstack([ours, theirs]))
 
-# The same box by planes.
+# Properties that were set before the first update stay, and so do those that belong to them.
 representation = simple.GetRepresentation(source, view)
+representation.BlendMode = "Isosurface"
+own_box, own_lights = [0, 20, 10, 40, 25, 60], [0, 0, 1, 1, 0.5, 0.5]
+own = vdi_filter(source, view, "CELLS", "field", 2.0, Resolution=[16, 12], CroppingBox=own_box, Diffuse=0.5,
+                 IsosurfaceValues=[150], Lights=own_lights)
+own.UpdatePipeline()
+check(own.Cropping == 0 and list(own.CroppingBox) == own_box, "a box that was set before the first update stays")
+check(own.Shade == 0 and own.Diffuse == 0.5, "and so does the shading")
+check(own.BlendMode == "Composite" and list(own.IsosurfaceValues) == [150], "and the blending")
+check(list(own.Lights) == own_lights, "and the lights")
+representation.BlendMode = "Composite"
+
+# The same box by planes.
 representation.UseCropping = 0
 simple.SetActiveView(None)
 planes = []

@@ -6,12 +6,14 @@
 #include <vtkLightCollection.h>
 #include <vtkPVDataInformation.h>
 #include <vtkRenderer.h>
+#include <vtkSMProperty.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMProxy.h>
 #include <vtkSMRenderViewProxy.h>
 
 #include <algorithm>
 #include <array>
+#include <initializer_list>
 #include <optional>
 #include <string>
 #include <vector>
@@ -109,6 +111,14 @@ bool areDefault(const std::vector<vdi::Light>& lights) {
          });
 }
 
+/// Whether nobody has set any of these properties of the filter. They are taken together or not at all: half
+/// of a user's shading with half of the view's is what nobody has asked for.
+bool areUnset(vtkSMProxy* filter, std::initializer_list<const char*> properties) {
+  return std::all_of(properties.begin(), properties.end(), [filter](const char* property) {
+    return filter->GetProperty(property)->IsValueDefault();
+  });
+}
+
 /// The box to which the scale and the origin of a cropped volume apply (pv::cropsByExtent). ParaView has no
 /// useful extent for several data sets, so their box comes from their bounds in each version.
 vdi::Box wholeToCrop(vtkPVDataInformation* data) {
@@ -139,8 +149,9 @@ void takeLights(vtkSMProxy* filter, vtkSMRenderViewProxy* view) {
 }
 
 void takeShading(vtkSMProxy* filter, vtkSMProxy* shown, vtkSMRenderViewProxy* view) {
-  takeLights(filter, view);
+  if (areUnset(filter, {"Lights"})) takeLights(filter, view);
   if (!isVolume(shown) || !isOn(shown, "Shade") || shown->GetProperty("Diffuse") == nullptr) return;
+  if (!areUnset(filter, {"Shade", "Diffuse", "Ambient"})) return;
   vtkSMPropertyHelper(filter, "Shade").Set(1);
   vtkSMPropertyHelper(filter, "Diffuse").Set(vtkSMPropertyHelper(shown, "Diffuse").GetAsDouble());
   if (isPlainHeadlight(shiningLights(view)))
@@ -149,6 +160,7 @@ void takeShading(vtkSMProxy* filter, vtkSMProxy* shown, vtkSMRenderViewProxy* vi
 
 void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, vtkPVDataInformation* data) {
   if (!isVolume(shown) || !isOn(shown, "UseCropping") || data == nullptr) return;
+  if (!areUnset(filter, {"Cropping", "CroppingBox"})) return;
   const vdi::Box whole = wholeToCrop(data);
   if (whole.empty()) return;
   const vtkSMPropertyHelper origin(shown, "CroppingOrigin");
@@ -166,6 +178,7 @@ void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, vtkPVDataInformation* d
 
 void takeBlending(vtkSMProxy* filter, vtkSMProxy* shown) {
   if (!isVolume(shown) || shown->GetProperty("BlendMode") == nullptr) return;
+  if (!areUnset(filter, {"BlendMode", "IsosurfaceValues"})) return;
   const int shownMode = vtkSMPropertyHelper(shown, "BlendMode").GetAsInt();
   std::optional<vdi::BlendMode> mode;
   if (shownMode == VolumeBlend::MaximumIntensity) mode = vdi::BlendMode::Maximum;

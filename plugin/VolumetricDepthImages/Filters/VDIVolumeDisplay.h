@@ -12,10 +12,12 @@ class vtkSMRenderViewProxy;
 namespace pv {
 
 /// Sets Lights of `filter`, and Shade, Diffuse and Ambient if `shown` shows a shaded volume; null means that
-/// it isn't shown. Volumes reflect ambient light only under a single headlight.
+/// it isn't shown. Volumes reflect ambient light only under a single headlight. This function and the next
+/// ones with `shown` leave what a user has set: the lights, the shading, the cropping, or the blending.
 void takeShading(vtkSMProxy* filter, vtkSMProxy* shown, vtkSMRenderViewProxy* view);
 
-/// Sets Lights of `filter` to the view's, or clears Lights if the view has the default ones.
+/// Sets Lights of `filter` to the view's, or clears Lights if the view has the default ones, even if a
+/// user has set others.
 void takeLights(vtkSMProxy* filter, vtkSMRenderViewProxy* view);
 
 /// Sets Cropping and CroppingBox if `shown` shows a cropped volume: to the box that ParaView draws. `data`

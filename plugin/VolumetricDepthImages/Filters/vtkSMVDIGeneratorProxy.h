@@ -6,8 +6,8 @@
  * shows the input, or whose camera a user has placed: the camera if position and focal point are the same,
  * Resolution if it is 0 0, ScalarOpacityUnitDistance if it is 0, Shade, Diffuse and Ambient if the view shows
  * a shaded volume, Cropping and CroppingBox if it shows a cropped one, BlendMode and IsosurfaceValues if it
- * shows a volume, and Lights. Traces and state files have these values. Proxies that a state file makes take
- * nothing.
+ * shows a volume, and Lights. Of these groups it takes those of which each property has its default. Traces
+ * and state files have the values. Proxies that a state file makes take nothing.
  *
  * If LookupTable has never been set, the proxy takes ParaView's colour map for the chosen array: the one that
  * a representation of the input uses in the active view, or would use, with its opacity function. The proxy
