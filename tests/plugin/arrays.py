@@ -1,5 +1,6 @@
 """Another array, component or input brings its own colours, at once, whatever updates the filter next."""
 
+import gc
 import os
 import sys
 
@@ -7,6 +8,8 @@ import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from pvtest import *  # noqa: E402,F403
+from paraview import servermanager  # noqa: E402
+from paraview.modules.vtkRemotingServerManager import vtkSMProxyManager, vtkSMUndoStack, vtkSMUndoStackBuilder  # noqa: E402
 
 SIZE = [96, 72]
 
@@ -256,4 +259,24 @@ again = [each for each in simple.GetSources().values() if each.SMProxy.GetXMLNam
 picture(again)
 again.SelectInputScalars = ["POINTS", "temperature"]
 check(again.LookupTable == simple.GetColorTransferFunction("temperature"), "a state's filter takes another array's map, too")
+
+# After Delete and Undo.
+stack, builder = vtkSMUndoStack(), vtkSMUndoStackBuilder()
+builder.SetUndoStack(stack)
+vtkSMProxyManager.GetProxyManager().SetUndoStackBuilder(builder)
+undone = simple.VolumetricDepthImage(registrationName="undone", Input=again.Input)
+undone.SelectInputScalars, undone.Resolution = ["POINTS", "a"], [16, 12]
+undone.UpdatePipeline()
+builder.Begin("Delete")
+simple.Delete(undone)
+del undone  # otherwise the proxy would live on
+gc.collect()
+builder.EndAndPushToStack()
+check(simple.FindSource("undone") is None, "a filter is deleted")
+stack.Undo()
+servermanager.ProxyManager().UpdateRegisteredProxies(1)
+undone = simple.FindSource("undone")
+undone.SelectInputScalars = ["POINTS", "temperature"]
+check(undone.LookupTable == simple.GetColorTransferFunction("temperature"), "and takes another array's map after the undo")
+vtkSMProxyManager.GetProxyManager().SetUndoStackBuilder(None)
 finish()

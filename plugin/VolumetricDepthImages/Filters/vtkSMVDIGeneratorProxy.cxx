@@ -209,6 +209,13 @@ int vtkSMVDIGeneratorProxy::LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLoc
   return this->Superclass::LoadXMLState(element, locator);
 }
 
+void vtkSMVDIGeneratorProxy::LoadState(const vtkSMMessage* state, vtkSMProxyLocator* locator) {
+  this->Superclass::LoadState(state, locator);
+  // The first update sets the map. Forget follows the undo of that update.
+  const vtkSMPropertyHelper table(this, "LookupTable");
+  if (table.GetNumberOfElements() > 0 && table.GetAsProxy() != nullptr) this->Taken = true;
+}
+
 void vtkSMVDIGeneratorProxy::TakeWhatIsNotSet(std::optional<double> time) {
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "what the view shows");
   this->TakeFromView();

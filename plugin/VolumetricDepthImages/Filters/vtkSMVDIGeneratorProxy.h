@@ -7,7 +7,7 @@
  * Resolution if it is 0 0, ScalarOpacityUnitDistance if it is 0, Shade, Diffuse and Ambient if the view shows
  * a shaded volume, Cropping and CroppingBox if it shows a cropped one, BlendMode and IsosurfaceValues if it
  * shows a volume, and Lights. Of these groups it takes those of which each property has its default. Traces
- * and state files have the values. Proxies that a state file makes take nothing.
+ * and state files have the values. Proxies that a state file makes, or the undo of a deletion, take nothing.
  *
  * If LookupTable has never been set, the proxy takes ParaView's colour map for the chosen array: the one that
  * a representation of the input uses in the active view, or would use, with its opacity function. The proxy
@@ -52,6 +52,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
 
   void UpdateVTKObjects() override;
   int LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) override;
+  /// Loads a state of the undo stack.
+  void LoadState(const vtkSMMessage* state, vtkSMProxyLocator* locator) override;
 
   /// Takes the array by which the active view colours the input, with its component. Call it when a user
   /// makes the proxy in the window: ParaView has given the property a default by then, and the proxy can't
