@@ -34,6 +34,27 @@ def filter_of(source, name="RTData", **properties):
     return image
 
 
+def range_of(proxy):
+    return [round(proxy.RGBPoints[0], 4), round(proxy.RGBPoints[-4], 4)]
+
+
+# Rank 0 alone has a block.
+VECTORS = """
+import numpy as np
+from vtkmodules.util.numpy_support import numpy_to_vtk
+from vtkmodules.vtkCommonDataModel import vtkImageData
+from vtkmodules.vtkParallelCore import vtkMultiProcessController
+if vtkMultiProcessController.GetGlobalController().GetLocalProcessId() == 0:
+    image = vtkImageData()
+    image.SetDimensions(9, 9, 9)
+    x = np.linspace(0, 1, 729)
+    for name, last in (("velocity", 3), ("force", 5)):
+        array = numpy_to_vtk(np.stack([x, -2 * x, last * x], axis=1), deep=True)
+        array.SetName(name)
+        image.GetPointData().AddArray(array)
+    self.GetOutputDataObject(0).SetBlock(0, image)
+"""
+
 wavelet = simple.Wavelet(WholeExtent=[-8, 8, -8, 8, -8, 8])
 nothing = filter_of(simple.TrivialProducer(registrationName="gird"))
 check(errors_of(nothing), "rank %d: an input without data is an error" % rank)
@@ -53,4 +74,14 @@ for name, values in (("FillGhosts", (0, 1)), ("PictureOnly", (0, 1)), ("Componen
     check("different values" in text, "rank %d: %s that differs is an error" % (rank, name))
     setattr(image, name, values[0])
     check(not errors_of(image), "rank %d: and equal again it works" % rank)
+
+# Another component or array gets its range over all ranks, those without blocks included.
+vectors = filter_of(simple.ProgrammableSource(OutputDataSetType="vtkMultiblockDataSet", Script=VECTORS), "velocity")
+check(not errors_of(vectors), "rank %d: vectors of one rank are rendered" % rank)
+vectors.Component = 2
+check(range_of(vectors.LookupTable) == [0, 3], "rank %d: a component has its range %s" % (rank, range_of(vectors.LookupTable)))
+vectors.SelectInputScalars = ["POINTS", "force"]
+check(range_of(vectors.LookupTable) == [0, 5] and vectors.Component == 2,
+      "rank %d: and so has that of another array %s" % (rank, range_of(vectors.LookupTable)))
+check(not errors_of(vectors), "rank %d: both are the same on all ranks" % rank)
 finish()

@@ -112,22 +112,35 @@ class Set {
   bool& Flag;
 };
 
-/// Widens the range over the ranks if each has a client of its own (pvbatch --symmetric, Catalyst), which
-/// knows the range of its own data only. Returns false if another rank doesn't take part; the next update
-/// reports that.
-bool WidenOverRanks(double range[2]) {
-  vtkMultiProcessController* controller = vtkMultiProcessController::GetGlobalController();
-  if (!vtkProcessModule::GetProcessModule()->GetSymmetricMPIMode() || controller == nullptr) return true;
+/// The ranks if each has a client of its own (pvbatch --symmetric, Catalyst), which knows its own data only;
+/// null otherwise.
+vtkMultiProcessController* ranksWithClients() {
+  if (!vtkProcessModule::GetProcessModule()->GetSymmetricMPIMode()) return nullptr;
+  return vtkMultiProcessController::GetGlobalController();
+}
+
+/// Collective if each rank has a client: replaces the numbers by the largest over the ranks. Returns false if
+/// another rank doesn't take part; the next update reports that.
+template <std::size_t N>
+bool takeLargest(std::array<double, N>& numbers, const char* what) {
+  vtkMultiProcessController* ranks = ranksWithClients();
+  if (ranks == nullptr) return true;
   try {
-    pv::enterCollective(controller, "range of VolumetricDepthImage's colour map");
+    pv::enterCollective(ranks, what);
   } catch (const vdi::Error&) {
     return false;
   }
-  const double mine[2] = {-range[0], range[1]};
-  double all[2];
-  controller->AllReduce(mine, all, 2, vtkCommunicator::MAX_OP);
-  range[0] = -all[0];
-  range[1] = all[1];
+  const std::array<double, N> mine = numbers;
+  ranks->AllReduce(mine.data(), numbers.data(), static_cast<vtkIdType>(N), vtkCommunicator::MAX_OP);
+  return true;
+}
+
+/// Widens the range over the ranks if each has a client. Collective then, and returns as takeLargest does.
+bool WidenOverRanks(double range[2]) {
+  std::array<double, 2> ends{-range[0], range[1]};
+  if (!takeLargest(ends, "range of VolumetricDepthImage's colour map")) return false;
+  range[0] = -ends[0];
+  range[1] = ends[1];
   return true;
 }
 
@@ -245,7 +258,10 @@ void vtkSMVDIGeneratorProxy::FollowArray() {
   const Set choosing(this->Choosing);
   const Subject before = std::exchange(*this->Shown, now);
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "the array's map and settings");
-  if (now.Input != before.Input || now.Port != before.Port) this->TakeUnitDistance();
+  if (now.Input != before.Input || now.Port != before.Port) {
+    this->Components.clear();
+    this->TakeUnitDistance();
+  }
   // A component that the new array lacks belonged to the old one.
   if (now.Array != before.Array && now.Component == before.Component && now.Component > 0 &&
       now.Component >= this->ComponentsOf(now.Array, now.Association)) {
@@ -310,10 +326,20 @@ void vtkSMVDIGeneratorProxy::TakeArrayFromView() {
 }
 
 int vtkSMVDIGeneratorProxy::ComponentsOf(const std::string& name, int association) {
+  if (const auto known = this->Components.find(name); known != this->Components.end()) return known->second;
   vtkPVDataInformation* data = this->InputInformation();
-  if (data == nullptr) return 0;
-  vtkPVArrayInformation* array = data->GetArrayInformation(name.c_str(), association);
-  return array != nullptr ? array->GetNumberOfComponents() : 0;
+  vtkPVArrayInformation* array =
+      data != nullptr ? data->GetArrayInformation(name.c_str(), association) : nullptr;
+  const int here = array != nullptr ? array->GetNumberOfComponents() : 0;
+  if (ranksWithClients() == nullptr) return here;
+  // A rank without blocks doesn't know the array, but must take the same next steps as the others. A known
+  // array isn't asked for again, so that ranks that disagree on the component alone don't wait here for ever.
+  // The next update reports that they do.
+  std::array<double, 1> most{static_cast<double>(here)};
+  if (!takeLargest(most, "components of VolumetricDepthImage's array")) return here;
+  const int components = static_cast<int>(most[0]);
+  if (components > 0) this->Components[name] = components;
+  return components;
 }
 
 void vtkSMVDIGeneratorProxy::Forget() {

@@ -25,6 +25,7 @@
 #include <vtkSMSourceProxy.h>
 #include <vtkWeakPointer.h>
 
+#include <map>
 #include <optional>
 #include <string>
 
@@ -113,7 +114,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   vdi::Box InputBounds();
   /// The view's representation of the input; null if there is none.
   vtkSMProxy* RepresentationIn(vtkSMViewProxy* view);
-  /// The number of components of the input's array; 0 if the array is missing.
+  /// The number of components of the input's array; 0 if the array is missing. Collective if each rank has a
+  /// client: the largest number.
   int ComponentsOf(const std::string& name, int association);
   /// `time` is that of the next update, if it has one. With `anew`, the map that is set belongs to another
   /// array, component or input.
@@ -146,6 +148,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   vtkWeakPointer<vtkSMProxy> ChosenMap;     // that map
   std::optional<Subject> Shown;             // the subject of the last map
   std::optional<double> TakenUnitDistance;  // taken from a view
+  std::map<std::string, int> Components;    // of the input's arrays, as the ranks' clients have agreed
 };
 
 #endif
