@@ -84,4 +84,11 @@ vectors.SelectInputScalars = ["POINTS", "force"]
 check(range_of(vectors.LookupTable) == [0, 5] and vectors.Component == 2,
       "rank %d: and so has that of another array %s" % (rank, range_of(vectors.LookupTable)))
 check(not errors_of(vectors), "rank %d: both are the same on all ranks" % rank)
+
+# Rank 0 alone makes the output. It refuses an array's name that is too long for a file.
+NAME = "x" * 2 ** 20
+named = simple.Calculator(Input=wavelet, Function="RTData", ResultArrayName=NAME)
+check("bytes" in errors_of(filter_of(named, NAME, LookupTable=image.LookupTable)),
+      "rank %d: an output that can't be made is an error" % rank)
+check(not errors_of(image), "rank %d: and another filter goes on" % rank)
 finish()

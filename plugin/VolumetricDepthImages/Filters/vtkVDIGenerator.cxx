@@ -804,22 +804,22 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, const pv::Origin& origin, v
     this->UpdateProgress(0.1 + 0.9 * done);
     return !this->CheckAbort();
   };
-  const auto takeReport = [&] {
+  std::optional<vdi::Image> picture;
+  std::optional<vdi::Vdi> vdi;
+  if (this->PictureOnly) {
+    picture = generator.renderVolume(camera, function, settings, progress);
+  } else {
+    vdi = generator.generate(camera, function, settings, progress);
+  }
+  // One rank alone has the result. If it can't pass that on, all ranks fail.
+  generator.communicator().together([&] {
     internal.TakeReports(generator);
     this->TakeReport();
-  };
-  if (this->PictureOnly) {
-    std::optional<vdi::Image> picture = generator.renderVolume(camera, function, settings, progress);
-    takeReport();
     if (picture) {
       pv::setPicture(output, *picture, true);
       pv::setPlace(output->GetFieldData(), camera, shown->bounds);
     }
-  } else {
-    std::optional<vdi::Vdi> vdi = generator.generate(camera, function, settings, progress);
-    takeReport();
-    if (!vdi) return;
-    giveVdi(*vdi, *shown, origin, this->TimeStep, output);
-  }
-  setTime(output, origin.time);
+    if (vdi) giveVdi(*vdi, *shown, origin, this->TimeStep, output);
+    if (vdi || this->PictureOnly) setTime(output, origin.time);
+  });
 }
