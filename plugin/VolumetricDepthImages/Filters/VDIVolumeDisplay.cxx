@@ -132,6 +132,39 @@ vdi::Box wholeToCrop(vtkPVDataInformation* data) {
   return {{b[0], b[2], b[4]}, {b[1], b[3], b[5]}};
 }
 
+/// Whether a property, whose name differs among versions of ParaView, exists and isn't the default.
+bool isChanged(vtkSMProxy* shown, const char* name) {
+  vtkSMProperty* property = shown->GetProperty(name);
+  return property != nullptr && !property->IsValueDefault();
+}
+
+/// Empty if the filter has the volume's blend mode.
+std::string blendModeIssue(vtkSMProxy* shown) {
+  if (shown->GetProperty("BlendMode") == nullptr) return {};
+  const char* name = nullptr;
+  switch (vtkSMPropertyHelper(shown, "BlendMode").GetAsInt()) {
+    case VolumeBlend::Composite:
+    case VolumeBlend::MaximumIntensity:
+    case VolumeBlend::MinimumIntensity:
+    case VolumeBlend::Isosurface:
+      return {};
+    case VolumeBlend::AverageIntensity:
+      name = "average intensities";
+      break;
+    case VolumeBlend::Additive:
+      name = "additive intensities";
+      break;
+    case VolumeBlend::Slice:
+      name = "a slice";
+      break;
+    default:
+      name = "something other than the composite";
+  }
+  return std::string("The view shows ") + name +
+         " of this volume (its Blend Mode), which VolumetricDepthImage doesn't support. It shows what "
+         "Blend Mode Composite shows.";
+}
+
 }  // namespace
 
 void takeLights(vtkSMProxy* filter, vtkSMRenderViewProxy* view) {
@@ -192,30 +225,27 @@ void takeBlending(vtkSMProxy* filter, vtkSMProxy* shown) {
   if (mode) vtkSMPropertyHelper(filter, "BlendMode").Set(static_cast<int>(*mode));
 }
 
-std::string blendModeIssue(vtkSMProxy* shown) {
-  if (!isVolume(shown) || shown->GetProperty("BlendMode") == nullptr) return {};
-  const char* name = nullptr;
-  switch (vtkSMPropertyHelper(shown, "BlendMode").GetAsInt()) {
-    case VolumeBlend::Composite:
-    case VolumeBlend::MaximumIntensity:
-    case VolumeBlend::MinimumIntensity:
-    case VolumeBlend::Isosurface:
-      return {};
-    case VolumeBlend::AverageIntensity:
-      name = "average intensities";
-      break;
-    case VolumeBlend::Additive:
-      name = "additive intensities";
-      break;
-    case VolumeBlend::Slice:
-      name = "a slice";
-      break;
-    default:
-      name = "something other than the composite";
+std::string displayIssues(vtkSMProxy* shown) {
+  if (!isVolume(shown)) return {};
+  std::string issues = blendModeIssue(shown);
+  const auto add = [&issues](const char* issue) {
+    issues += (issues.empty() ? "" : " ") + std::string(issue);
+  };
+  if (isOn(shown, "UseTransfer2D")) {
+    add("The view colours this volume by a 2-D transfer function (its Use 2D Transfer Function), in place of "
+        "which VolumetricDepthImage uses the colour map and the opacity function.");
+  } else if (isOn(shown, "UseSeparateOpacityArray")) {
+    add("The view takes this volume's opacity from another array (its Use Separate Opacity Array), in place "
+        "of which VolumetricDepthImage uses the array that it shows.");
   }
-  return std::string("The view shows ") + name +
-         " of this volume (its Blend Mode), which VolumetricDepthImage doesn't support. It shows what "
-         "Blend Mode Composite shows.";
+  // ParaView 5.13 has renamed Position to Translation.
+  constexpr std::array transforming{"Position", "Translation", "Scale", "Orientation"};
+  if (std::any_of(transforming.begin(), transforming.end(),
+                  [shown](const char* name) { return isChanged(shown, name); })) {
+    add("The view moves, scales or turns this volume (its Transforming), but VolumetricDepthImage shows it "
+        "where its data are.");
+  }
+  return issues;
 }
 
 }  // namespace pv

@@ -28,9 +28,9 @@ void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, vtkPVDataInformation* d
 /// has.
 void takeBlending(vtkSMProxy* filter, vtkSMProxy* shown);
 
-/// The message for a user whose view shows the volume in a blend mode that the filter lacks; empty if the
-/// filter has it.
-std::string blendModeIssue(vtkSMProxy* shown);
+/// The message for a user whose view shows the volume by properties that the filter lacks: its blend mode,
+/// another array's opacity, a 2-D transfer function, another place. Empty if the filter shows what it shows.
+std::string displayIssues(vtkSMProxy* shown);
 
 }  // namespace pv
 

@@ -357,7 +357,7 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
   pv::takeShading(this, shown, view);
   pv::takeCropping(this, shown, this->InputInformation());
   pv::takeBlending(this, shown);
-  if (const std::string issue = pv::blendModeIssue(shown); !issue.empty()) vtkWarningMacro(<< issue);
+  if (const std::string issues = pv::displayIssues(shown); !issues.empty()) vtkWarningMacro(<< issues);
   if (isPlaced(view) && vtkSMPropertyHelper(this, "CameraPosition").GetDoubleArray() ==
                             vtkSMPropertyHelper(this, "CameraFocalPoint").GetDoubleArray())
     SetCamera(this, view);
