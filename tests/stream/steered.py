@@ -19,8 +19,7 @@ opacities = GetOpacityTransferFunction("V")
 opacities.RescaleTransferFunction(0.0, 1.0)
 for function in (colors, opacities):
     function.ScalarRangeInitialized = 1
-image.LookupTable = colors
-image.ScalarOpacityFunction = opacities
+image.LookupTable = colors  # which has these opacities
 image.Resolution = [96, 54]
 image.CameraPosition = [18.0, 20.0, 60.0]
 image.CameraFocalPoint = [18.0, 6.0, 6.0]

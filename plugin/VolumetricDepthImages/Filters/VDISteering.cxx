@@ -98,7 +98,11 @@ void SetColours(vtkSMProxy* generator, const Wish& wish) {
   // A preset changes neither the range nor the opacities.
   constexpr bool toCurrentRange = true;
   if (wish.preset) vtkSMTransferFunctionProxy::ApplyPreset(colours, wish.preset->c_str(), toCurrentRange);
-  for (vtkSMProxy* const function : {colours, FunctionOf(generator, "ScalarOpacityFunction")}) {
+  vtkSMProxy* opacities = FunctionOf(generator, "ScalarOpacityFunction");
+  // Without one of its own, the filter uses the map's.
+  if (opacities == nullptr)
+    opacities = vtkSMPropertyHelper(colours, "ScalarOpacityFunction", true).GetAsProxy();
+  for (vtkSMProxy* const function : {colours, opacities}) {
     if (function == nullptr) continue;
     if (wish.range)
       vtkSMTransferFunctionProxy::RescaleTransferFunction(function, (*wish.range)[0], (*wish.range)[1]);
