@@ -23,7 +23,7 @@ image.SetDimensions(n, n, n)
 image.SetSpacing({spacing}, {spacing}, {spacing})
 z, y, x = np.meshgrid(*[np.linspace(-1, 1, n)] * 3, indexing="ij")
 field = 1 - np.sqrt((x * x + y * y + z * z) / 3)
-arrays = dict(a=field * {scale}, temperature=1000 + 1000 * field, flat=np.zeros_like(field) + 5)
+arrays = {{"a": field * {scale}, "temperature": 1000 + 1000 * field, "flat": np.zeros_like(field) + 5, "Q criterion": -field}}
 for name, values in arrays.items():
     array = numpy_to_vtk(values.ravel().copy(), deep=True)
     array.SetName(name)
@@ -248,9 +248,9 @@ check(ends[0] < -3 and ends[1] == round(np.pi, 4), "and that of the data, which 
 table = image.LookupTable.SMProxy.ComputeDataHistogramTable(2)
 bins = [table.GetColumn(1).GetValue(i) for i in range(2)]
 check(0.8 < bins[0] / bins[1] < 1.25, "nor is their histogram %s" % bins)
-image.SelectInputScalars, image.Component = ["POINTS", "a"], -1
+image.SelectInputScalars, image.Component = ["POINTS", "Q criterion"], -1
 
-# After a state file.
+# After a state file, which knows the map by a name without the space.
 state = os.path.join(OUTPUT, "arrays.pvsm")
 simple.SaveState(state)
 simple.ResetSession()

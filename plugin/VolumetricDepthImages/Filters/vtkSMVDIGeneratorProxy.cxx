@@ -10,6 +10,7 @@
 #include <vtkPVDataInformation.h>
 #include <vtkProcessModule.h>
 #include <vtkSMComparativeViewProxy.h>
+#include <vtkSMCoreUtilities.h>
 #include <vtkSMInputProperty.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMProxy.h>
@@ -281,9 +282,10 @@ bool vtkSMVDIGeneratorProxy::HasMapOf(const std::string& name) {
   vtkSMProxy* map = table.GetNumberOfElements() > 0 ? table.GetAsProxy() : nullptr;
   if (map == nullptr) return false;
   if (map == this->ChosenMap) return true;
-  // A map from a state file.
+  // A map from a state file. ParaView leaves spaces and the like out of the names of maps.
   const char* registered = this->GetSessionProxyManager()->GetProxyName("lookup_tables", map);
-  return registered != nullptr && !name.empty() && std::string_view(registered).starts_with(name + ".");
+  return registered != nullptr && !name.empty() &&
+         std::string_view(registered).starts_with(vtkSMCoreUtilities::SanitizeName(name) + ".");
 }
 
 vtkSMRenderViewProxy* vtkSMVDIGeneratorProxy::RenderViewOf(vtkSMProxy* view) {
