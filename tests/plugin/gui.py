@@ -1,8 +1,10 @@
-"""Runs inside the real ParaView (--script, which sets no __file__): uses the plugin as a person would, then leaves the file
-gui.done with "ok" or what went wrong. tests/plugin/gui.sh takes the picture of the window and ends the program."""
+"""Runs inside the real ParaView (--script, which sets no __file__): uses the plugin as a person would, looks at what the
+window does by itself then, and leaves the file gui.done with "ok" or what went wrong. tests/plugin/gui.sh takes the picture
+of the window and ends the program."""
 
 import os
 import sys
+import time
 import traceback
 
 sys.path.insert(0, os.environ["VDI_TEST_SOURCE"])
@@ -51,13 +53,66 @@ def use():
     pvtest.check(share > 0.01, "Show puts the picture into the view")
     simple.Show(image, view)
     simple.Render(view)
-    return pvtest.failures
+    return view, image
+
+
+class Later:
+    """Steps after the end of the script, in the window's event loop. Each is asked for again and again until it returns True,
+    for at most 30 seconds."""
+
+    def __init__(self, view, steps):
+        self.steps, self.since = steps, time.monotonic()
+        self.interactor = view.GetInteractor()
+        self.observer = self.interactor.AddObserver("TimerEvent", self.look)
+        self.timer = self.interactor.CreateRepeatingTimer(100)
+
+    def look(self, *_):
+        import pvtest
+        try:
+            what, step = self.steps[0]
+            good = step()
+            if not good and time.monotonic() < self.since + 30:
+                return
+            pvtest.check(good, what)
+            self.steps, self.since = self.steps[1:], time.monotonic()
+            if self.steps:
+                return
+            message = "; ".join(pvtest.failures) or "ok"
+        except Exception:
+            message = traceback.format_exc()
+        self.interactor.DestroyTimer(self.timer)
+        self.interactor.RemoveObserver(self.observer)
+        leave(message)
+
+
+def leave(message):
+    with open(os.path.join(OUTPUT, "gui.done"), "w") as done:
+        done.write(message)
+
+
+def is_idle(image):
+    """Whether no VDI is being made for the window."""
+    image.SMProxy.UpdatePropertyInformation()
+    return image.SMProxy.GetProperty("Held").GetElement(0) == 0
+
+
+def approach(view, image):
+    """Moves the view straight towards the middle of the volume. From there, the part that Cropping leaves is seen from another
+    side, by 22 degrees."""
+    from paraview import simple
+    image.Cropping, image.CroppingBox = 1, [6, 10, -10, -6, 6, 10]
+    image.AutoAngle, image.Auto = 10, 1
+    view.InteractionMode = "3D"
+    view.CameraPosition, view.CameraFocalPoint = [0.35 * x for x in image.CameraPosition], [8, -8, 8]
+    simple.Render(view)
+    return list(view.CameraPosition)
 
 
 try:
-    failures = use()
-    message = "ok" if not failures else "; ".join(failures)
+    view, image = use()
+    near = approach(view, image)
+    later = Later(view, [
+        ("Auto goes by the angle at the middle of what Cropping leaves",
+         lambda: max(abs(a - b) for a, b in zip(image.CameraPosition, near)) < 1e-3 and is_idle(image))])
 except Exception:
-    message = traceback.format_exc()
-with open(os.path.join(OUTPUT, "gui.done"), "w") as done:
-    done.write(message)
+    leave(traceback.format_exc())

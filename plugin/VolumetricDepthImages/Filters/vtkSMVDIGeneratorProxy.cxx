@@ -411,12 +411,17 @@ vtkPVDataInformation* vtkSMVDIGeneratorProxy::InputInformation() {
   return source != nullptr ? source->GetDataInformation(input.GetOutputPort()) : nullptr;
 }
 
-vdi::Box vtkSMVDIGeneratorProxy::InputBounds() {
+vdi::Box vtkSMVDIGeneratorProxy::ShownBounds() {
   vtkPVDataInformation* data = this->InputInformation();
   if (data == nullptr) return {};
-  double b[6];
-  data->GetBounds(b);
-  return {{b[0], b[2], b[4]}, {b[1], b[3], b[5]}};
+  const auto box = [](const double* b) { return vdi::Box{{b[0], b[2], b[4]}, {b[1], b[3], b[5]}}; };
+  double bounds[6];
+  data->GetBounds(bounds);
+  const vdi::Box whole = box(bounds);
+  if (vtkSMPropertyHelper(this, "Cropping").GetAsInt() == 0) return whole;
+  const vdi::Box cropped =
+      whole.intersection(box(vtkSMPropertyHelper(this, "CroppingBox").GetDoubleArray().data()));
+  return cropped.empty() ? whole : cropped;
 }
 
 double vtkSMVDIGeneratorProxy::DegreesFrom(vtkSMRenderViewProxy* view) {
@@ -429,7 +434,7 @@ double vtkSMVDIGeneratorProxy::DegreesFrom(vtkSMRenderViewProxy* view) {
       .focalPoint = vector("CameraFocalPoint"),
       .viewUp = vector("CameraViewUp"),
       .parallelProjection = vtkSMPropertyHelper(this, "CameraParallelProjection").GetAsInt() != 0};
-  return vdi::degreesBetween(this->InputBounds(), own, cameraOf(view->GetActiveCamera()));
+  return vdi::degreesBetween(this->ShownBounds(), own, cameraOf(view->GetActiveCamera()));
 }
 
 std::string vtkSMVDIGeneratorProxy::WhyNotFrom(vtkSMViewProxy* view) {
@@ -438,7 +443,7 @@ std::string vtkSMVDIGeneratorProxy::WhyNotFrom(vtkSMViewProxy* view) {
   const std::array<int, 2> size = resolutionOf(renderView);
   try {
     const vdi::View seen(cameraOf(renderView->GetActiveCamera()), size[0], size[1]);
-    const auto issue = vdi::viewpointIssue(this->InputBounds(), seen, seen);
+    const auto issue = vdi::viewpointIssue(this->ShownBounds(), seen, seen);
     if (issue == vdi::ViewpointIssue::SeesNothing)
       return "This view doesn't see the volume, which lies behind its camera or beside its picture.";
   } catch (const vdi::Error& error) {

@@ -76,7 +76,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// Sets camera and Resolution to the view's, and traces it. Returns "", or the reason why the view can't be
   /// used; then it sets nothing.
   std::string SetViewpoint(vtkSMViewProxy* view);
-  /// The angle in degrees, at the middle of the input, between the view's camera and the camera that is set.
+  /// The angle in degrees, at the middle of what is shown of the input, between the view's camera and the
+  /// camera that is set.
   double DegreesFrom(vtkSMRenderViewProxy* view);
 
   /// The estimate for the VDI that the panel's numbers describe, applied or not; nullopt with PictureOnly.
@@ -111,7 +112,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   vtkSMRenderViewProxy* ViewToTakeFrom();
   /// Null if there is no input.
   vtkPVDataInformation* InputInformation();
-  vdi::Box InputBounds();
+  /// The bounds of a VDI of the input: those of its part in the cropping box, if there is one. A VDI that
+  /// shows nothing has the input's.
+  vdi::Box ShownBounds();
   /// The view's representation of the input; null if there is none.
   vtkSMProxy* RepresentationIn(vtkSMViewProxy* view);
   /// The number of components of the input's array; 0 if the array is missing. Collective if each rank has a
