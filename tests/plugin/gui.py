@@ -53,7 +53,7 @@ def use():
     pvtest.check(share > 0.01, "Show puts the picture into the view")
     simple.Show(image, view)
     simple.Render(view)
-    return view, image
+    return view, image, rendered
 
 
 class Later:
@@ -61,13 +61,16 @@ class Later:
     for at most 30 seconds."""
 
     def __init__(self, view, steps):
-        self.steps, self.since = steps, time.monotonic()
+        self.steps, self.since, self.looks = steps, time.monotonic(), False
         self.interactor = view.GetInteractor()
         self.observer = self.interactor.AddObserver("TimerEvent", self.look)
         self.timer = self.interactor.CreateRepeatingTimer(100)
 
     def look(self, *_):
         import pvtest
+        if self.looks:  # a step lets the window handle its events
+            return
+        self.looks = True
         try:
             what, step = self.steps[0]
             good = step()
@@ -80,6 +83,8 @@ class Later:
             message = "; ".join(pvtest.failures) or "ok"
         except Exception:
             message = traceback.format_exc()
+        finally:
+            self.looks = False
         self.interactor.DestroyTimer(self.timer)
         self.interactor.RemoveObserver(self.observer)
         leave(message)
@@ -108,11 +113,49 @@ def approach(view, image):
     return list(view.CameraPosition)
 
 
+def show_alone(view, image, rendered):
+    """Shows what Render VDI makes of the image, and not the image."""
+    from paraview import simple
+    image.Auto, image.Cropping, image.Resolution = 0, 0, [480, 320]
+    image.CameraPosition, image.CameraFocalPoint = [45, 32, 52], [0, 0, 0]
+    simple.Hide(image, view)
+    display = simple.Show(rendered, view)
+    display.SetRepresentationType("Slice")
+    simple.ColorBy(display, ("POINTS", "RGBA"))
+    display.MapScalars = 0
+    simple.ResetCamera(view)
+    simple.Render(view)
+    return True
+
+
+def colors_of(rendered):
+    """The colours that the filter has, without an update."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    return vtk_to_numpy(rendered.GetClientSideObject().GetOutputDataObject(0).GetPointData().GetArray("RGBA")).astype(int)
+
+
+def edit(image, rendered):
+    """Turns the colours around. Returns the picture before."""
+    before = colors_of(rendered)
+    image.LookupTable.RGBPoints = [37, 0.9, 0.1, 0.1, 157, 0.9, 0.9, 0.2, 277, 0.1, 0.2, 0.9]
+    return before
+
+
+def has_changed(rendered, before):
+    now = colors_of(rendered)
+    return now.shape == before.shape and abs(now - before).max() > 30
+
+
 try:
-    view, image = use()
+    view, image, rendered = use()
     near = approach(view, image)
+    before = []
     later = Later(view, [
         ("Auto goes by the angle at the middle of what Cropping leaves",
-         lambda: max(abs(a - b) for a, b in zip(image.CameraPosition, near)) < 1e-3 and is_idle(image))])
+         lambda: max(abs(a - b) for a, b in zip(image.CameraPosition, near)) < 1e-3 and is_idle(image)),
+        ("Render VDI is shown alone", lambda: show_alone(view, image, rendered)),
+        ("the window has nothing left to do", lambda: time.monotonic() > later.since + 1.5),
+        ("a colour is edited", lambda: before.append(edit(image, rendered)) is None),
+        ("a view of Render VDI alone follows the edit", lambda: has_changed(rendered, before[0]))])
 except Exception:
     leave(traceback.format_exc())

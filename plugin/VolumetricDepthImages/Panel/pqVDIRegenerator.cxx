@@ -4,8 +4,6 @@
 #include <pqAnimationScene.h>
 #include <pqApplicationCore.h>
 #include <pqCoreUtilities.h>
-#include <pqDataRepresentation.h>
-#include <pqOutputPort.h>
 #include <pqPipelineSource.h>
 #include <pqServerManagerModel.h>
 #include <pqUndoStack.h>
@@ -22,6 +20,7 @@
 #include <algorithm>
 #include <string>
 
+#include "VDIViews.h"
 #include "vtkSMVDIGeneratorProxy.h"
 #include "vtkVDIRepresentation.h"
 
@@ -111,17 +110,15 @@ void pqVDIRegenerator::watchMaps() {
   watch(vtkSMPropertyHelper(this->generator(), "ScalarOpacityFunction").GetAsProxy());
 }
 
-bool pqVDIRegenerator::isShown() const {
-  const QList<pqView*> views = this->Source->getViews();
-  return std::any_of(views.begin(), views.end(), [this](pqView* view) { return this->isShownIn(view); });
+/// Whether a view shows the VDI, or what other filters make of it.
+bool pqVDIRegenerator::isUsed() const {
+  const QList<pqView*> views = pqApplicationCore::instance()->getServerManagerModel()->findItems<pqView*>();
+  return std::any_of(views.begin(), views.end(),
+                     [this](pqView* view) { return pv::showsResultOf(view, this->Source); });
 }
 
 bool pqVDIRegenerator::isShownIn(pqView* view) const {
-  const QList<pqOutputPort*> ports = this->Source->getOutputPorts();
-  return std::any_of(ports.begin(), ports.end(), [view](pqOutputPort* port) {
-    pqDataRepresentation* shown = port->getRepresentation(view);
-    return shown != nullptr && shown->isVisible();
-  });
+  return pv::shows(view, this->Source);
 }
 
 /// After an undo of the first Apply, the next Apply is the first one again.
@@ -164,7 +161,7 @@ void pqVDIRegenerator::viewAdded(pqView* view) {
 /// Makes screenshots and saved frames of animations wait for the VDI that is being made.
 void pqVDIRegenerator::beginRender() {
   auto* view = qobject_cast<pqView*>(this->sender());
-  if (view == nullptr || !this->isShownIn(view)) return;
+  if (view == nullptr || !pv::showsResultOf(view, this->Source)) return;
   vtkRenderWindow* window = view->getViewProxy()->GetRenderWindow();
   if (window == nullptr || !vtkVDIRepresentation::IsCaptured(window)) return;
   this->IsCaptured = true;
@@ -227,7 +224,7 @@ void pqVDIRegenerator::hold(int restMilliseconds) {
 }
 
 void pqVDIRegenerator::mapChanged() {
-  if (this->Source->modifiedState() == pqProxy::UNINITIALIZED || !this->isShown()) return;
+  if (this->Source->modifiedState() == pqProxy::UNINITIALIZED || !this->isUsed()) return;
   this->hold(editRestMilliseconds);
 }
 
@@ -265,7 +262,7 @@ void pqVDIRegenerator::finish() {
   // These views have kept the held filter's output.
   for (pqView* view : this->comparativeViews()) view->getProxy()->MarkDirty(this->generator());
   Q_EMIT this->progress(-1);
-  this->Source->renderAllViews();
+  pv::renderViewsOf(this->Source);
 }
 
 QString pqVDIRegenerator::regenerate(pqView* view) {

@@ -65,7 +65,7 @@ class pqVDIRegenerator : public QObject {
   enum class State { Idle, Waiting, Preparing };
 
   vtkSMVDIGeneratorProxy* generator() const;
-  bool isShown() const;
+  bool isUsed() const;
   bool isShownIn(pqView* view) const;
   QList<pqView*> comparativeViews() const;
   void setAutoView(pqView* view);

@@ -9,6 +9,7 @@
 #include <QApplication>
 
 #include "VDIViewpoint.h"
+#include "VDIViews.h"
 
 namespace {
 
@@ -49,7 +50,7 @@ void pqVDIStreamFollower::look() {
     this->Seen = arrivals;
     proxy->InvokeCommand("Take");
     proxy->MarkDirty(proxy);
-    this->Source->renderAllViews();
+    pv::renderViewsOf(this->Source);
     if (this->WaitsForFirst) this->lookFromViewpoint();
     proxy->UpdatePropertyInformation(proxy->GetProperty("Connection"));
   }
