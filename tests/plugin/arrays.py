@@ -233,7 +233,13 @@ simple.Delete(moving)
 image.SelectInputScalars = ["POINTS", "a"]
 
 # The phase of complex numbers, which ParaView's arrays have no component for.
-image.SelectInputScalars, image.Component = ["POINTS", "complex"], -2
+image.SelectInputScalars = ["POINTS", "complex"]
+for component in (-1, 1):
+    image.Component = component
+    image.Component = -2
+    ends, mode = range_of(image.LookupTable), image.LookupTable.VectorMode
+    check(ends == [-round(np.pi, 4), round(np.pi, 4)] and mode == "Magnitude",
+          "the phase has its range at once, after component %d: %s, %s" % (component, ends, mode))
 shown = simple.Show(image, view)
 shown.SetRepresentationType("VDI")
 simple.Render(view)

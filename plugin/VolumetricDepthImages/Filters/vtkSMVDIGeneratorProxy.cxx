@@ -234,7 +234,7 @@ void vtkSMVDIGeneratorProxy::TakeWhatIsNotSet(std::optional<double> time) {
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "what the view shows");
   this->TakeFromView();
   const Set choosing(this->Choosing);
-  this->ChooseLookupTable(time, false);
+  this->ChooseLookupTable(time, nullptr);
   this->Shown = this->CurrentSubject();
 }
 
@@ -272,7 +272,7 @@ void vtkSMVDIGeneratorProxy::FollowArray() {
   if (this->HasMapOf(before.Array)) {
     vtkSMPropertyHelper(this, "LookupTable").RemoveAllValues();
     this->Chosen.clear();  // if the range is unknown, the next update chooses the map
-    this->ChooseLookupTable(std::nullopt, true);
+    this->ChooseLookupTable(std::nullopt, &before);
   }
   this->Superclass::UpdateVTKObjects();
 }
@@ -513,12 +513,12 @@ void vtkSMVDIGeneratorProxy::ReleaseNow() {
   this->MarkDirty(this);
 }
 
-void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time, bool anew) {
+void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time, const Subject* before) {
   vtkSMPropertyHelper table(this, "LookupTable");
   vtkSMPropertyHelper scalars(this, "SelectInputScalars");
   const char* name = scalars.GetNumberOfElements() > 4 ? scalars.GetAsString(4) : nullptr;
   const bool isSet = table.GetNumberOfElements() > 0 && table.GetAsProxy() != nullptr;
-  const bool wanted = anew || (!isSet && this->Chosen.empty());
+  const bool wanted = before != nullptr || (!isSet && this->Chosen.empty());
   if (!wanted || name == nullptr || *name == '\0') return;
   vtkNew<vtkSMTransferFunctionManager> manager;
   vtkSMProxy* map = this->MapInView(name, scalars.GetAsInt(3));
@@ -526,7 +526,7 @@ void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time, bool 
   if (map == nullptr) return;
   vtkSMProxy* opacity = vtkSMPropertyHelper(map, "ScalarOpacityFunction", true).GetAsProxy();
   if (opacity == nullptr) opacity = manager->GetOpacityTransferFunction(name, this->GetSessionProxyManager());
-  const bool another = this->NameComponent(map, name, scalars.GetAsInt(3)) && anew;
+  const bool another = this->NameComponent(map, name, scalars.GetAsInt(3), before) && before != nullptr;
   // A function that has not been used yet is still on [0, 1]. It gets the array's range, as in a
   // representation.
   const bool mapWaits = WaitsForRange(map, "RGBPoints") || another;
@@ -543,17 +543,19 @@ void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time, bool 
   this->ChosenMap = map;
 }
 
-/// Makes the map's legends name the component, unless the view shows the input by this map. Returns true if
-/// that changed the map and the map may be rescaled: then it gets the component's range, as when ParaView
-/// itself chooses a component.
-bool vtkSMVDIGeneratorProxy::NameComponent(vtkSMProxy* map, const std::string& name, int association) {
+/// Makes the map's legends name the component, unless the view shows the input by this map. Maps have no name
+/// for the phase, and take it for the magnitude. Returns true if the component has changed and the map may be
+/// rescaled: then it gets the component's range, as when ParaView itself chooses a component.
+bool vtkSMVDIGeneratorProxy::NameComponent(vtkSMProxy* map, const std::string& name, int association,
+                                           const Subject* before) {
   const int component = vtkSMPropertyHelper(this, "Component").GetAsInt();
   if (this->ComponentsOf(name, association) < 2 || map->GetProperty("VectorMode") == nullptr) return false;
   vtkSMPropertyHelper mode(map, "VectorMode");
   vtkSMPropertyHelper number(map, "VectorComponent");
   const bool isMagnitude = mode.GetAsInt() != vtkScalarsToColors::COMPONENT;
-  if (component == vdi::phase) return false;  // maps have no name for it
-  if (component < 0 ? isMagnitude : !isMagnitude && number.GetAsInt() == component) return false;
+  const bool isNamed = component < 0 ? isMagnitude : !isMagnitude && number.GetAsInt() == component;
+  const bool wasPhase = before != nullptr && before->Component == vdi::phase;
+  if (isNamed && (before == nullptr || wasPhase == (component == vdi::phase))) return false;
   vtkSMProxy* shown = this->RepresentationIn(this->ActiveView());
   if (this->MapInView(name, association) == map && vtkSMPropertyHelper(shown, "Visibility").GetAsInt() != 0)
     return false;

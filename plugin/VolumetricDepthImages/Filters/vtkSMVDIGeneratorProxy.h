@@ -105,6 +105,16 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   vtkSMVDIGeneratorProxy(const vtkSMVDIGeneratorProxy&) = delete;
   void operator=(const vtkSMVDIGeneratorProxy&) = delete;
 
+  /// The data that a map is chosen for.
+  struct Subject {
+    vtkSMProxy* Input = nullptr;  // compared, never followed
+    unsigned int Port = 0;
+    std::string Array;
+    int Association = 0;
+    int Component = -1;
+    bool operator==(const Subject&) const = default;
+  };
+
   void TakeWhatIsNotSet(std::optional<double> time);
   void TakeFromView();
   vtkSMViewProxy* ActiveView();
@@ -120,28 +130,19 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// The number of components of the input's array; 0 if the array is missing. Collective if each rank has a
   /// client: the largest number.
   int ComponentsOf(const std::string& name, int association);
-  /// `time` is that of the next update, if it has one. With `anew`, the map that is set belongs to another
-  /// array, component or input.
-  void ChooseLookupTable(std::optional<double> time, bool anew);
+  /// `time` is that of the next update, if it has one. With `before`, the map that is set belongs to that
+  /// other array, component or input.
+  void ChooseLookupTable(std::optional<double> time, const Subject* before);
   void FollowArray();
   void TakeUnitDistance();
   /// Whether the map that is set belongs to the array, and isn't a user's choice.
   bool HasMapOf(const std::string& name);
-  bool NameComponent(vtkSMProxy* map, const std::string& name, int association);
+  bool NameComponent(vtkSMProxy* map, const std::string& name, int association, const Subject* before);
   /// The map by which the active view colours the input by that array; null if it doesn't.
   vtkSMProxy* MapInView(const std::string& name, int association);
   /// The range of the input's array over all ranks. Returns false if there is none.
   bool RangeOfScalars(const char* name, int association, std::optional<double> time, double range[2]);
 
-  /// The data that a map is chosen for.
-  struct Subject {
-    vtkSMProxy* Input = nullptr;  // compared, never followed
-    unsigned int Port = 0;
-    std::string Array;
-    int Association = 0;
-    int Component = -1;
-    bool operator==(const Subject&) const = default;
-  };
   Subject CurrentSubject();
 
   bool UpdatesForView = false;
