@@ -320,9 +320,13 @@ int IsolatedRun::handOver(std::int64_t step, double time, double now) {
   }
   // Scripts may use all fields. Where a rank lacks a named one, too, all ranks hand over all: their processes
   // take one array after the other together, and a message about a missing array lists the others.
-  const bool namedAlone = meet<1>(self_.comm, {hasNamedFields() ? 0 : 1})[0] == 0;
+  bool namedAlone = false;
+  int code = guarded(
+      self_, VDI_CATALYST_SCRIPT, [&] { namedAlone = hasNamedFields(); }, step);
+  if (code != VDI_CATALYST_OK) return code;
+  namedAlone = meet<1>(self_.comm, {namedAlone ? 0 : 1})[0] == 0;
   std::optional<StepWriter> data;
-  const int code = guarded(
+  code = guarded(
       self_, VDI_CATALYST_SCRIPT,
       [&] {
         data.emplace(self_.fields.version(), self_.fields.blocks(), fieldsOf(namedAlone), parameters_.all());
