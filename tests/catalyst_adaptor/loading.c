@@ -38,8 +38,7 @@ static cost measure(void) {
     if (path == NULL || strstr(path, ".so") == NULL || strcmp(path, last) == 0) continue;
     strcpy(last, path); /* a library's parts follow each other */
     ++result.libraries;
-    result.of_paraview +=
-        strstr(path, "libvtk") != NULL || strstr(path, "libpython") != NULL;
+    result.of_paraview += strstr(path, "libvtk") != NULL || strstr(path, "libpython") != NULL;
     result.of_vulkan += strstr(path, "libvulkan") != NULL;
   }
   FILE* rollup = fopen("/proc/self/smaps_rollup", "r");
