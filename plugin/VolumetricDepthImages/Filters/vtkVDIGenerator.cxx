@@ -812,12 +812,12 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, const pv::Origin& origin, v
     vdi = generator.generate(camera, function, settings, progress);
   }
   // One rank alone has the result. If it can't pass that on, all ranks fail.
-  generator.communicator().together([&] {
+  generator.communicator().together([&, &from = camera] {
     internal.TakeReports(generator);
     this->TakeReport();
     if (picture) {
       pv::setPicture(output, *picture, true);
-      pv::setPlace(output->GetFieldData(), camera, shown->bounds);
+      pv::setPlace(output->GetFieldData(), from, shown->bounds);
     }
     if (vdi) giveVdi(*vdi, *shown, origin, this->TimeStep, output);
     if (vdi || this->PictureOnly) setTime(output, origin.time);
