@@ -54,9 +54,11 @@ if(VDI_QT STREQUAL "Qt6" AND ParaView_VERSION VERSION_LESS 6)
 endif()
 set(VDI_NEEDS_DISPLAY ON)
 set(VDI_PLUGIN_UNITY "${CMAKE_UNITY_BUILD}")
+if(ParaView_VERSION VERSION_GREATER_EQUAL 5.12)
+  set(VDI_PLUGIN_UNITY OFF) # the header that it generates has no include guard
+endif()
 if(ParaView_VERSION VERSION_GREATER_EQUAL 6)
   set(VDI_NEEDS_DISPLAY OFF)
-  set(VDI_PLUGIN_UNITY OFF) # the header that it generates has no include guard
 endif()
 set(VDI_GL_LOADER VTK::glew)
 if(TARGET VTK::glad)
