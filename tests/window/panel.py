@@ -207,6 +207,8 @@ def first_session(window):
     with open(path("trace.py"), "w") as file:
         file.write(LOAD + trace + REPLAY)
     window.screenshot("9_trace.png")
+    window.close_dialog("ParaView Python Script Editor")
+    window.click("Discard", "push button")
     window.close_dialog("Script Editor")
     for name in ("CameraPosition", "Resolution", "ScalarOpacityUnitDistance"):
         check("volumetricDepthImage1.%s = " % name in trace, "the trace has " + name)
