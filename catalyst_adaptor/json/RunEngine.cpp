@@ -107,11 +107,7 @@ struct RunEngine::State {
   }
   bool isRoot() const { return comm.rank() == 0; }
   /// Collective: the root's answer on all ranks.
-  bool asRootSays(bool answer) const {
-    std::array<std::uint64_t, 1> word{isRoot() && answer ? std::uint64_t{1} : 0};
-    comm.allReduceMax(word);
-    return word[0] != 0;
-  }
+  bool asRootSays(bool answer) const { return comm.broadcast(answer ? 1.0 : 0.0, 0) != 0.0; }
   double elapsed() const { return std::chrono::duration<double>(Clock::now() - begin).count(); }
 
   int fortranCommunicator;

@@ -19,6 +19,15 @@ def screenshot(view, name):
     return pvtest.read_png(path)
 
 
+def show_slice(source, view):
+    """Shows the source's flat picture in its own colours."""
+    from paraview import simple
+    display = simple.Show(source, view)
+    display.SetRepresentationType("Slice")
+    simple.ColorBy(display, ("POINTS", "RGBA"))
+    display.MapScalars = 0
+
+
 def use():
     import pvtest
     from paraview import simple
@@ -36,10 +45,7 @@ def use():
     rendered = simple.RenderVDI(Input=image)
     rendered.UseOriginalCamera = 1
     rendered.Azimuth = 15
-    display = simple.Show(image, view)
-    display.SetRepresentationType("Slice")
-    simple.ColorBy(display, ("POINTS", "RGBA"))
-    display.MapScalars = 0
+    show_slice(image, view)
     simple.SetActiveSource(image)
     simple.ResetCamera(view)
     simple.Render(view)
@@ -119,10 +125,7 @@ def show_alone(view, image, rendered):
     image.Auto, image.Cropping, image.Resolution = 0, 0, [480, 320]
     image.CameraPosition, image.CameraFocalPoint = [45, 32, 52], [0, 0, 0]
     simple.Hide(image, view)
-    display = simple.Show(rendered, view)
-    display.SetRepresentationType("Slice")
-    simple.ColorBy(display, ("POINTS", "RGBA"))
-    display.MapScalars = 0
+    show_slice(rendered, view)
     simple.ResetCamera(view)
     simple.Render(view)
     return True
