@@ -32,7 +32,7 @@ TEST_CASE("optical model: several ranks") {
     for (std::size_t i = c.parallel ? 1 : 0; i < functions.size(); i += 3) {
       const test::NamedFunction& named = functions[i];
       Image expected;
-      for (const double rate : {1.0, 8.0}) {
+      for (const double rate : {automaticRate, 8.0}) {
         INFO(toString(stretch.type) << ", " << named.name << ", rate " << rate);
         const GenerateSettings settings = test::opticalSettings(rate);
         if (world.rank() == 0 && expected.rgba.empty())

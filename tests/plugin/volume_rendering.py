@@ -149,10 +149,11 @@ for data, make in DATA.items():
             image.UpdatePropertyInformation()
             report = image.SMProxy.GetProperty("Report").GetElement(0)
             rate = report.split("samples per voxel: ")[1].split()[0]
-            similar, to_theirs = ssim(seen, fine), ssim(seen, theirs)
-            check(similar >= 0.995,
+            similar, to_theirs, fine_to_theirs = ssim(seen, fine), ssim(seen, theirs), ssim(fine, theirs)
+            # Volume itself is coarse where hues change fast, so the picture need only be as near to it as the fine one.
+            check(similar >= 0.995 and to_theirs >= fine_to_theirs - 0.004,
                   "%s %s: SSIM of %s at the default rate, %s, and eight %.4f; to ParaView's %.4f, at eight %.4f"
-                  % (data, name, what, rate, similar, to_theirs, ssim(fine, theirs)))
+                  % (data, name, what, rate, similar, to_theirs, fine_to_theirs))
             write_png("%s_%s_%s.png" % (data, name, what.split()[-1]), np.hstack([seen, fine, theirs]))
         simple.Delete(view)
 finish()
