@@ -131,8 +131,7 @@ mean, and the whole frame.
 The table of suite viewpoints has the least, median and mean SSIM over two kinds of viewpoints: random ones at
 the VDI's distance all around the focal point ('sphere'), and four that are turned from it to each side
 ('turned'). 'missing' is the share of the picture, at worst and on average, where volume rendering shows
-material and the VDI shows none. From a set of several VDIs, 'nearest' shows the one whose viewpoint is
-nearest by angle, and 'blend' mixes the two nearest. MiB and ms are those of the whole set.
+material and the VDI shows none.
 The table of suite stream has the frames per second that a viewer decoded and drew, --turn degrees from their
 viewpoint, and their age at that moment. The age counts from the beginning of the VDI's generation ('live':
 made and published as the extractor VDIStream does) or from the file's appearance ('folder': followed as vdi
@@ -296,11 +295,6 @@ void addViewpointsOptions(CLI::App& command, BenchOptions& options) {
       .add_option("--list-resolutions", options.listResolutions,
                   "resolutions of VDIs to run; default: --resolution, which is that of the views")
       ->type_name("WxH")
-      ->group(viewpointsGroup);
-  command
-      .add_option("--sets", options.sets,
-                  "VDIs in a set: 1, 2 (front and back), 4 (a tetrahedron) or 6 (front, back and sides)")
-      ->capture_default_str()
       ->group(viewpointsGroup);
 }
 

@@ -28,7 +28,7 @@ json readBench(const std::filesystem::path& path) {
 std::string keyOf(const json& row) {
   std::string key;
   for (const char* field : {"dataset", "algorithm", "supersegments", "width", "height", "view_deg",
-                            "angle_deg", "scaling", "layout", "size", "zoom", "views", "set", "serves"}) {
+                            "angle_deg", "scaling", "layout", "size", "zoom", "views"}) {
     if (row.contains(field)) key.append(key.empty() ? 0 : 1, ' ').append(row[field].dump());
   }
   if (row.contains("margin") && row["margin"] != 0.0) key += " margin " + row["margin"].dump();

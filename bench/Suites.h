@@ -40,7 +40,6 @@ struct BenchOptions {
   double turn = 20.0;  // degrees
   std::vector<double> zooms{1.0, 4.0};
   std::vector<double> margins{0.0};
-  std::vector<int> sets{1};
   std::vector<std::string> listResolutions;  // of VDIs' pictures; empty: the views'
   // For the suite `stream`, which uses `turn` and `frames`, too:
   std::vector<std::string> rates{"1Gbit", "100Mbit"};  // to the viewer

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <future>
@@ -21,7 +20,6 @@
 #include "vdi/core/Error.h"
 #include "vdi/core/ImageMetrics.h"
 #include "vdi/core/SettingsTable.h"
-#include "vdi/core/Viewpoint.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
 #include "vdi/pipeline/VdiGenerator.h"
@@ -115,34 +113,6 @@ struct Trueness {
   std::vector<double> missing;  // share of the picture that is visible in DVR but not in the VDI
 };
 
-/// The weights of the set's VDIs in a view, by index. They add up to 1.
-using Shares = std::vector<std::pair<std::size_t, float>>;
-
-Shares nearestOf(const std::vector<Camera>& set, const Camera& view, const Box& bounds) {
-  std::size_t nearest = 0;
-  for (std::size_t i = 1; i < set.size(); ++i) {
-    if (degreesBetween(bounds, set[i], view) < degreesBetween(bounds, set[nearest], view)) nearest = i;
-  }
-  return {{nearest, 1.0F}};
-}
-
-/// Blends the two VDIs with the smallest angles. The second one's weight becomes 0 where the third
-/// one replaces it. From a VDI's own viewpoint, only that VDI is visible.
-Shares blendOf(const std::vector<Camera>& set, const Camera& view, const Box& bounds) {
-  std::vector<std::pair<double, std::size_t>> byAngle;
-  for (std::size_t i = 0; i < set.size(); ++i) byAngle.emplace_back(degreesBetween(bounds, set[i], view), i);
-  std::sort(byAngle.begin(), byAngle.end());
-  if (set.size() < 2 || byAngle[0].first < 1e-6) return {{byAngle[0].second, 1.0F}};
-  const double end = set.size() > 2 ? byAngle[2].first : 180.0;
-  const auto weight = [&](std::size_t i) {
-    return std::max(0.0, 1.0 - byAngle[i].first / end) / byAngle[i].first;
-  };
-  const double sum = weight(0) + weight(1);
-  if (!(sum > 0.0)) return {{byAngle[0].second, 1.0F}};
-  return {{byAngle[0].second, static_cast<float>(weight(0) / sum)},
-          {byAngle[1].second, static_cast<float>(weight(1) / sum)}};
-}
-
 /// Settings of the VDIs. Throws Error.
 std::vector<GenerateSettings> allSettings(const BenchOptions& options) {
   std::vector<std::string> resolutions = options.listResolutions;
@@ -175,11 +145,9 @@ class ViewpointSuite {
 
   std::vector<json> rows() {
     if (root()) {
-      fmt::print(
-          table_,
-          "{:<16} {:>4} {:<9} {:<9} {:>3} {:>6} {:>3} {:<7} {:>8} {:>8} {:>8} {:>9} {:>9} {:>8} {:>9}\n",
-          "data set", "zoom", "views", "lists", "N_S", "margin", "set", "serves", "SSIM min", "median",
-          "mean", "missing %", "mean %", "MiB", "frame ms");
+      fmt::print(table_, "{:<16} {:>4} {:<9} {:<9} {:>3} {:>6} {:>8} {:>8} {:>8} {:>9} {:>9} {:>8} {:>9}\n",
+                 "data set", "zoom", "views", "lists", "N_S", "margin", "SSIM min", "median", "mean",
+                 "missing %", "mean %", "MiB", "frame ms");
     }
     for (const DataSet& set : dataSets(options_)) {
       setBlocks(set);
@@ -189,13 +157,12 @@ class ViewpointSuite {
   }
 
  private:
-  /// One set of VDIs. Only the root has it.
+  /// A VDI. Only the root has its renderer.
   struct Made {
-    std::vector<Camera> cameras;
-    std::vector<std::unique_ptr<VdiRenderer>> renderers;
+    std::unique_ptr<VdiRenderer> renderer;
     std::size_t supersegments = 0;
     std::size_t storedBytes = 0;
-    double milliseconds = 0.0;  // for all VDIs of the set
+    double milliseconds = 0.0;
   };
 
   bool root() const { return world_.rank() == 0; }
@@ -239,58 +206,32 @@ class ViewpointSuite {
         viewsOf("sphere", around),
         viewsOf(fmt::format("turned {:g}", options_.turn), turnedCameras(camera, options_.turn))};
     for (const GenerateSettings& settings : allSettings(options_)) {
-      for (const int count : options_.sets) {
-        const Made made = make(camera, count, settings);
-        world_.together([&] {
-          if (!root()) return;
-          for (const Views& views : kinds) {
-            addRow(name, zoom, settings, made, views, false);
-            if (count > 1) addRow(name, zoom, settings, made, views, true);
-          }
-        });
-      }
-    }
-  }
-
-  Made make(const Camera& camera, int count, const GenerateSettings& settings) {
-    Made made;
-    made.cameras = camerasOfSet(camera, count);
-    for (const Camera& own : made.cameras) {
-      std::optional<Vdi> vdi;
-      made.milliseconds += readyMs(world_, [&] { vdi = generator_.generate(own, function_, settings); });
+      const Made made = make(camera, settings);
       world_.together([&] {
-        if (!vdi) return;
-        made.supersegments += vdi->supersegmentCount();
-        made.storedBytes += io::encode(*vdi).size();
-        made.renderers.push_back(std::make_unique<VdiRenderer>(device_));
-        made.renderers.back()->setVdi(*vdi);
+        if (!root()) return;
+        for (const Views& views : kinds) addRow(name, zoom, settings, made, views);
       });
     }
-    return made;
   }
 
-  /// A premultiplied picture of bytes.
-  std::vector<glm::u8vec4> seen(const Made& made, const Camera& camera, const Shares& shares,
-                                const glm::ivec2& size) {
-    std::vector<glm::vec4> sum;
-    for (const auto& [index, weight] : shares) {
-      const ImageBytes own =
-          made.renderers[index]->renderBytes(camera, size.x, size.y, Alpha::Premultiplied, reconstruction_);
-      if (shares.size() == 1) return {own.rgba.begin(), own.rgba.end()};
-      sum.resize(own.rgba.size());
-      for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += weight / 255.0F * glm::vec4(own.rgba[i]);
-    }
-    std::vector<glm::u8vec4> bytes;
-    bytes.reserve(sum.size());
-    for (const glm::vec4& p : sum) bytes.emplace_back(toByte(p.r), toByte(p.g), toByte(p.b), toByte(p.a));
-    return bytes;
+  Made make(const Camera& camera, const GenerateSettings& settings) {
+    Made made;
+    std::optional<Vdi> vdi;
+    made.milliseconds = readyMs(world_, [&] { vdi = generator_.generate(camera, function_, settings); });
+    world_.together([&] {
+      if (!vdi) return;
+      made.supersegments = vdi->supersegmentCount();
+      made.storedBytes = io::encode(*vdi).size();
+      made.renderer = std::make_unique<VdiRenderer>(device_);
+      made.renderer->setVdi(*vdi);
+    });
+    return made;
   }
 
   /// The device renders the next view while the host compares one, because an idle GPU lowers its
   /// clock.
-  Trueness truenessOf(const Made& made, const Views& views, bool blends) {
+  Trueness truenessOf(const Made& made, const Views& views) {
     Trueness trueness;
-    const Box& bounds = generator_.scene().bounds;
     std::future<std::pair<double, double>> last;
     const auto note = [&] {
       if (!last.valid()) return;
@@ -299,10 +240,10 @@ class ViewpointSuite {
       trueness.missing.push_back(missing);
     };
     for (const ViewTruth& truth : views.truths) {
-      const Shares shares = blends ? blendOf(made.cameras, truth.camera, bounds)
-                                   : nearestOf(made.cameras, truth.camera, bounds);
       const glm::ivec2 size{truth.picture.width, truth.picture.height};
-      std::vector<glm::u8vec4> pixels = seen(made, truth.camera, shares, size);
+      const ImageBytes seen =
+          made.renderer->renderBytes(truth.camera, size.x, size.y, Alpha::Premultiplied, reconstruction_);
+      std::vector<glm::u8vec4> pixels(seen.rgba.begin(), seen.rgba.end());
       note();
       last = std::async(std::launch::async, [&truth, size, pixels = std::move(pixels)] {
         return std::pair(ssimOf(truth, size, pixels), missingOf(truth, pixels));
@@ -313,8 +254,8 @@ class ViewpointSuite {
   }
 
   void addRow(const std::string& name, double zoom, const GenerateSettings& settings, const Made& made,
-              const Views& views, bool blends) {
-    const Trueness trueness = truenessOf(made, views, blends);
+              const Views& views) {
+    const Trueness trueness = truenessOf(made, views);
     const auto meanOf = [](const std::vector<double>& values) {
       double sum = 0.0;
       for (const double value : values) sum += value;
@@ -322,22 +263,18 @@ class ViewpointSuite {
     };
     const Spread ssim = spreadOf(trueness.ssims);
     const Spread missing = spreadOf(trueness.missing);
-    const char* const serves = blends ? "blend" : "nearest";
-    fmt::print(
-        table_,
-        "{:<16} {:>4g} {:<9} {:<9} {:>3} {:>6g} {:>3} {:<7} {:>8.4f} {:>8.4f} {:>8.4f} {:>9.3f} {:>9.3f} "
-        "{:>8.3f} {:>9.1f}\n",
-        name, zoom, views.name, fmt::format("{}x{}", settings.width, settings.height), settings.supersegments,
-        settings.margin, made.cameras.size(), serves, ssim.minimum, ssim.median, meanOf(trueness.ssims),
-        100.0 * missing.maximum, 100.0 * meanOf(trueness.missing),
-        static_cast<double>(made.storedBytes) / (1 << 20), made.milliseconds);
+    fmt::print(table_,
+               "{:<16} {:>4g} {:<9} {:<9} {:>3} {:>6g} {:>8.4f} {:>8.4f} {:>8.4f} {:>9.3f} {:>9.3f} {:>8.3f} "
+               "{:>9.1f}\n",
+               name, zoom, views.name, fmt::format("{}x{}", settings.width, settings.height),
+               settings.supersegments, settings.margin, ssim.minimum, ssim.median, meanOf(trueness.ssims),
+               100.0 * missing.maximum, 100.0 * meanOf(trueness.missing),
+               static_cast<double>(made.storedBytes) / (1 << 20), made.milliseconds);
     std::fflush(table_);
     json row{{"dataset", name},
              {"zoom", zoom},
              {"views", views.name},
              {"viewpoints", views.truths.size()},
-             {"set", made.cameras.size()},
-             {"serves", serves},
              {"truth_rate", options_.truthRate},
              {"reconstruction", toString(reconstruction_)},
              {"ssim", ssim.minimum},
@@ -347,7 +284,7 @@ class ViewpointSuite {
              {"missing_mean", meanOf(trueness.missing)},
              {"supersegment_count", made.supersegments},
              {"stored_bytes", made.storedBytes},
-             {"set_ms", made.milliseconds}};
+             {"frame_ms", made.milliseconds}};
     addSettings(row, settings);
     rows_.push_back(std::move(row));
   }
@@ -364,33 +301,7 @@ class ViewpointSuite {
 
 }  // namespace
 
-std::vector<Camera> camerasOfSet(const Camera& original, int count) {
-  const View view(original, 1, 1);
-  const glm::dvec3 front = -view.forward();
-  std::vector<glm::dvec3> directions{front};
-  if (count == 2) {
-    directions.push_back(-front);
-  } else if (count == 4) {
-    const double aside = std::sqrt(8.0) / 3.0;
-    for (const double degrees : {90.0, 210.0, 330.0}) {
-      const double angle = degrees * std::numbers::pi / 180.0;
-      directions.push_back(-front / 3.0 +
-                           aside * (std::cos(angle) * view.right() + std::sin(angle) * view.up()));
-    }
-  } else if (count == 6) {
-    for (const glm::dvec3& side : {-front, view.right(), -view.right(), view.up(), -view.up()})
-      directions.push_back(side);
-  } else if (count != 1) {
-    throw Error(ErrorCode::InvalidArgument, fmt::format("sets have 1, 2, 4 or 6 viewpoints, not {}", count),
-                "--sets");
-  }
-  std::vector<Camera> cameras{original};
-  for (std::size_t i = 1; i < directions.size(); ++i) cameras.push_back(seenFrom(original, directions[i]));
-  return cameras;
-}
-
 void requireSoundViewpoints(const BenchOptions& options) {
-  for (const int count : options.sets) (void)camerasOfSet(Camera(), count);
   for (const double zoom : options.zooms) {
     if (!(zoom > 0.0) || !std::isfinite(zoom))
       throw Error(ErrorCode::InvalidArgument, fmt::format("zooms must be > 0, not {}", zoom), "--zooms");

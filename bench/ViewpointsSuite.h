@@ -8,21 +8,15 @@
 
 #include "bench/Suites.h"
 #include "vdi/comm/Communicator.h"
-#include "vdi/core/Camera.h"
 #include "vdi/gpu/Device.h"
 
 namespace vdi::bench {
 
-/// The viewpoints of a set: `original`, and others at its distance from its focal point. 2: front
-/// and back; 4: a tetrahedron's corners; 6: front, back and four sides. Throws
-/// Error{InvalidArgument} for other counts.
-std::vector<Camera> camerasOfSet(const Camera& original, int count);
-
 /// Checks the options before the work starts. Throws Error.
 void requireSoundViewpoints(const BenchOptions& options);
 
-/// Returns one row for each data set, zoom, kind of viewpoints, N_S, margin and set, and writes its
-/// line to `table` at once. Collective over `world`; the root gets the rows. Throws Error.
+/// Returns one row for each data set, zoom, kind of viewpoints, N_S and margin, and writes its line
+/// to `table` at once. Collective over `world`; the root gets the rows. Throws Error.
 std::vector<nlohmann::json> runViewpoints(const BenchOptions& options, const comm::Communicator& world,
                                           const std::shared_ptr<gpu::Device>& device, std::FILE* table);
 
