@@ -66,6 +66,8 @@ class Page {
     this.vdi = undefined;
     this.frame = 0;
     this.isPlaying = false;
+    /** Counts how often Play started or ended. A loop of an earlier start ends. */
+    this.plays = 0;
     /** Counts requests for frames. A late answer to an older request is dropped. */
     this.request = 0;
     this.ownBackground = false;
@@ -264,17 +266,20 @@ class Page {
   /** @param {boolean} on */
   play(on) {
     this.isPlaying = on;
+    ++this.plays;
     element("play").textContent = on ? "Pause" : "Play";
     element("play").setAttribute("aria-pressed", String(on));
     if (on) this.playOn();
   }
 
   async playOn() {
+    const {plays} = this;
     let missed = 0;  // frames in a row, behind the one on show
-    while (this.isPlaying && this.count() > 0) {
+    while (plays === this.plays && this.count() > 0) {
       const next = (this.frame + 1 + missed) % this.count();
       const pause = new Promise((resolve) => setTimeout(resolve, 1000 / FRAMES_PER_SECOND));
       const outcome = await this.show(next);
+      if (plays !== this.plays) return;
       missed = outcome === "missed" ? missed + 1 : 0;
       if (outcome === "failed" || missed >= this.count()) {
         this.play(false);
