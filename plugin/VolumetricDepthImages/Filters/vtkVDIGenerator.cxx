@@ -22,6 +22,7 @@
 #include <chrono>
 #include <cstring>
 #include <exception>
+#include <new>
 #include <optional>
 #include <string>
 #include <utility>
@@ -486,9 +487,17 @@ bool vtkVDIGenerator::Defer(vtkDataObject* input, const pv::Origin& origin, bool
     return false;
   }
   if (!this->Ask(input, origin)) return false;
-  this->GiveEarlier(output);
-  setTime(output, origin.time);
-  return true;
+  // Rank 0 alone gives a picture. If it has no memory for that, all ranks make the VDI in place.
+  bool isGiven = true;
+  try {
+    this->GiveEarlier(output);
+    setTime(output, origin.time);
+  } catch (const std::bad_alloc&) {
+    isGiven = false;
+  }
+  if (pv::onAllRanks(this->Controller, isGiven)) return true;
+  output->Initialize();
+  return false;
 }
 
 /// Notes the request that Prepare will fulfil. Returns false for an unusable input; an update in place
