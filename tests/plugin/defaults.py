@@ -1,12 +1,14 @@
 """The filters' defaults, and their messages when a script asks for what isn't there."""
 
 import os
+import re
 import sys
 
 import numpy as np
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from pvtest import *  # noqa: E402,F403
+from paraview import servermanager  # noqa: E402
 from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
 from vtkmodules.vtkRenderingCore import vtkRenderer  # noqa: E402
 
@@ -178,4 +180,21 @@ filter_of(producer_of(renamed(field([0, 0, 0]), "preset")), name="preset").Updat
 check(range_of("preset") == [0, 4, 0, 2], "a preset waits for the range, opacities set beside it don't move")
 check(not errors_of(filter_of(source, "POINTS", "velocity", Component=0)), "a component is rendered")
 check(range_of("velocity") == [-1, 3, -1, 3], "and its map has the range of the component, not of the magnitude")
+
+# Data without arrays.
+bare = vtkImageData()
+bare.SetDimensions(5, 5, 5)
+said = errors_of(simple.VolumetricDepthImage(Input=producer_of(bare)))
+check(said.count("ERROR") == 1 and "the data have no arrays" in said, "data without arrays get one message: " + said)
+
+# The panel hides properties that have no effect on a VDI, by names that this ParaView's representation has.
+source_file = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "plugin", "VolumetricDepthImages",
+                           "Panel", "pqVDIDisplayWidgets.cxx")
+with open(source_file) as file:
+    idle = re.findall(r'"(\w+)"', re.search(r"idle\{(.*?)\};", file.read(), re.DOTALL).group(1))
+representation = servermanager.ProxyManager().NewProxy("representations", "VDIImageRepresentation")
+unknown = {name for name in idle if representation.GetProperty(name) is None}
+of_other_versions = {"Position", "Translation", "UseNanColorForMissingArrays"}  # ParaView 6 renamed and added some
+check(len(idle) > 20 and unknown <= of_other_versions,
+      "the VDI's representation has the properties that the panel hides, all but %s" % sorted(unknown))
 finish()

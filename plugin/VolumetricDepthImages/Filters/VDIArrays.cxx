@@ -60,16 +60,20 @@ void count(vtkDataObject* leaf, const ArrayChoice& choice, Holders& holders) {
     return;
   }
   if (!holders.missing.empty()) return;
-  const std::string wanted = choice.name.empty() ? "active scalars" : fmt::format("array '{}'", choice.name);
+  if (image->GetPointData()->GetNumberOfArrays() + image->GetCellData()->GetNumberOfArrays() == 0) {
+    holders.missing = "the data have no arrays, neither of points nor of cells";
+    return;
+  }
+  const std::string wanted =
+      choice.name.empty() ? "are no active scalars" : fmt::format("is no array '{}'", choice.name);
   const bool otherHas = !choice.name.empty() && has(attributesOf(image, !choice.cells), choice.name);
-  holders.missing =
-      fmt::format("there is no {} of {}{}; of points there are: {}; of cells: {}", wanted,
-                  choice.cells ? "cells" : "points",
-                  otherHas ? fmt::format(" (SelectInputScalars = ['{}', '{}'] asks for the one of {})",
-                                         choice.cells ? "POINTS" : "CELLS", choice.name,
-                                         choice.cells ? "points" : "cells")
-                           : "",
-                  namesOf(image->GetPointData()), namesOf(image->GetCellData()));
+  holders.missing = fmt::format(
+      "there {} of {}{}; of points there are: {}; of cells: {}", wanted, choice.cells ? "cells" : "points",
+      otherHas
+          ? fmt::format(" (SelectInputScalars = ['{}', '{}'] asks for the one of {})",
+                        choice.cells ? "POINTS" : "CELLS", choice.name, choice.cells ? "points" : "cells")
+          : "",
+      namesOf(image->GetPointData()), namesOf(image->GetCellData()));
 }
 
 }  // namespace

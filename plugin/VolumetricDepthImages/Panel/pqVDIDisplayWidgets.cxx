@@ -14,7 +14,7 @@
 namespace {
 
 /// The properties of ParaView's representations that have no effect on a VDI.
-constexpr std::array<std::string_view, 26> idle{"Ambient",
+constexpr std::array<std::string_view, 24> idle{"Ambient",
                                                 "AmbientColor",
                                                 "Diffuse",
                                                 "DiffuseColor",
@@ -37,8 +37,6 @@ constexpr std::array<std::string_view, 26> idle{"Ambient",
                                                 "SpecularPower",
                                                 "Texture",
                                                 "Translation",
-                                                "TransferFunction2D",
-                                                "Use2DTransferFunction",
                                                 "UseNanColorForMissingArrays"};
 
 bool isIdle(pqPropertyWidget* widget) {
