@@ -110,7 +110,7 @@ double vdisPerSecond(VdiGenerator& generator, ClockRaiser& clock, const FrameInp
     return generator.start(input.camera.azimuth(360.0 * frame / orbit), input.function, input.settings);
   };
   clock.run();
-  {  // two frames, because two VDIs use memory at a time
+  {  // Make two frames first: two VDIs hold memory at once.
     VdiFrame first = start(orbit - 2);
     generator.finish(start(orbit - 1));
     generator.finish(std::move(first));

@@ -8,7 +8,7 @@ import {SUBPROTOCOL} from "./messages.js";
 /** @typedef {import("./live.js").Arrived} Arrived */
 
 /**
- * What a request for a frame comes to. "shown": the page shows it, in full or at the level that came
+ * The outcome of a request for a frame. "shown": the page shows it, in full or at the level that came
  * in time; "missed": its file is damaged or gone; "failed": the connection is lost, or the user wants
  * another frame meanwhile.
  * @typedef {"shown" | "missed" | "failed"} Outcome

@@ -295,7 +295,7 @@ int IsolatedRun::execute(std::int64_t step, double time) {
   return code;
 }
 
-/// Hands a step over that is wanted.
+/// Hands over a wanted step.
 int IsolatedRun::handOver(std::int64_t step, double time, double now) {
   int earlier = VDI_CATALYST_OK;
   if (!process_) {

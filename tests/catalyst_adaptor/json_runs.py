@@ -149,7 +149,7 @@ def cinema():
     contents = [open(os.path.join("o.cdb", row["FILE"]), "rb").read() for row in rows]
     assert all(content.startswith(b"\x89PNG") for content in contents) and len(set(contents)) == len(rows)
     refused(document, "o.cdb/000000/00.png")
-    # After a restart the pictures of before are still in the index, and each stands there once.
+    # After a restart the index still lists the earlier pictures, each once.
     run({**document, "existing": "continue"}, 0, 0, 0, VDI_TEST_FIRST="2")
     again = list(csv.DictReader(open("o.cdb/data.csv")))
     assert again[:24] == rows and len(again) == 36, len(again)

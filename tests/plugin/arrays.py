@@ -232,7 +232,7 @@ simple.Delete(moving_shown)
 simple.Delete(moving)
 image.SelectInputScalars = ["POINTS", "a"]
 
-# The phase of complex numbers, which ParaView's arrays have no component for.
+# The phase of complex numbers, for which ParaView has no component.
 image.SelectInputScalars = ["POINTS", "complex"]
 for component in (-1, 1):
     image.Component = component

@@ -1,4 +1,4 @@
-"""ParaView's window with the plugin, connected to a server without it: one line of Output Messages says what helps."""
+"""ParaView's window with the plugin, connected to a server without it: Output Messages shows one line with the remedy."""
 
 import os
 import subprocess

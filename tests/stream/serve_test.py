@@ -235,7 +235,7 @@ class ServeTest(ServedFolder):
         self.assertEqual(set(last), set(range(6)))
         for step, data in last.values():
             self.assertEqual((step, data), (4, self.bytes_of("small1")))
-        # The stalled one has missed some, and then gets the newest.
+        # The stalled viewer has missed frames; it now gets the newest.
         for announced, data in stalled.levels():
             if announced["step"] == 4:
                 break

@@ -27,7 +27,7 @@ def path(name):
 def black_background(window):
     """Sets the black background that the tool's pictures have."""
     window.click("Load a color palette")
-    window.key(*["Down"] * 6, "Return")  # Black Background: its menu tells nobody of itself
+    window.key(*["Down"] * 6, "Return")  # Black Background; the menu is not exposed to accessibility tools
 
 
 def middle_of_view(window, name):

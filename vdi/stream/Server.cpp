@@ -42,7 +42,7 @@ std::string addressText(const std::string& host, std::uint16_t port) {
   return isV6 ? fmt::format("[{}]:{}", host, port) : fmt::format("{}:{}", host, port);
 }
 
-/// The host's name in links. If the address stands for all of the machine's, that is the machine's name.
+/// The host name used in links; for a wildcard address, the machine's name.
 std::string nameInLinks(const std::string& host) {
   if (host != "0.0.0.0" && host != "::") return host;
   constexpr std::size_t longest = 256;

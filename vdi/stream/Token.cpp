@@ -77,7 +77,7 @@ TokenCheck::TokenCheck(std::string_view token) : digest_(digestOf(token)) {
 }
 
 bool TokenCheck::accepts(std::string_view token) const {
-  // Digests have one length, so that not even the token's length shows.
+  // All digests have the same length, so the comparison doesn't reveal the token's length.
   const auto digest = digestOf(token);
   return CRYPTO_memcmp(digest.data(), digest_.data(), digest.size()) == 0;
 }

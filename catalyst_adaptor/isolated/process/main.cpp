@@ -104,7 +104,7 @@ std::vector<std::string> environmentOf(const Setup& setup) {
   for (const std::string& variable : setup.environment) {
     if (!isOfMpiJob(variable) && !variable.starts_with("VDI_ISOLATION=")) variables.push_back(variable);
   }
-  variables.emplace_back("VDI_ISOLATION=none");  // here is where the frames are made
+  variables.emplace_back("VDI_ISOLATION=none");  // this process makes the frames itself
   return variables;
 }
 

@@ -27,7 +27,7 @@ class vtkMultiProcessController;
 
 namespace pv {
 
-/// Facts about the blocks of all ranks that a volume shows.
+/// Properties of the blocks, on all ranks, that a volume shows.
 struct Shown {
   Origin of;
   vdi::Box bounds;

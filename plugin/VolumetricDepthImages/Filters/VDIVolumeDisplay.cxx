@@ -111,8 +111,8 @@ bool areDefault(const std::vector<vdi::Light>& lights) {
          });
 }
 
-/// Whether nobody has set any of these properties of the filter. They are taken together or not at all: half
-/// of a user's shading with half of the view's is what nobody has asked for.
+/// True if none of these properties of the filter has been set. All are taken or none: a mix of the user's
+/// and the view's shading would be unexpected.
 bool areUnset(vtkSMProxy* filter, std::initializer_list<const char*> properties) {
   return std::all_of(properties.begin(), properties.end(), [filter](const char* property) {
     return filter->GetProperty(property)->IsValueDefault();
