@@ -94,7 +94,7 @@ def test_frames(browser):
         browser.wait("vdiPage.live.live.state === 'live'", SECONDS)
         browser.value("new Promise((done) => setTimeout(done, 1000))")
         check(browser.value("vdiPage.frame") == 2, "a paused page keeps its frame over a reconnect")
-        check(line(browser).startswith("Paused"), f"and its pause: {line(browser)}")
+        check(line(browser).startswith("Paused"), f"a paused page stays paused over a reconnect: {line(browser)}")
         browser.value("document.getElementById('pause').click()")
         wait_for_frame(browser, 3)
 
@@ -123,7 +123,7 @@ def test_size(_):
     packed = len(gzip.compress(page))
     print(f"the page: {len(page)} bytes, {packed} compressed", flush=True)
     check(len(page) <= 250000 and packed <= 60000, "the page is small")
-    check(TOKEN.encode() not in page, "and has no secret")
+    check(TOKEN.encode() not in page, "the page has no secret")
 
 
 def test_tokens(browser):
@@ -133,7 +133,7 @@ def test_tokens(browser):
             browser.open(link)
             browser.wait("window.vdiPage && vdiPage.live.live.state === 'refused'", SECONDS)
             check("token" in message_of(browser), f"a wrong token: {message_of(browser)}")
-            check(browser.value("vdiPage.vdi === undefined"), "shows nothing")
+            check(browser.value("vdiPage.vdi === undefined"), "a page with a wrong token shows nothing")
         browser.open(server.link.split("#")[0])
         check("token" in message_of(browser), f"no token: {message_of(browser)}")
         # The right link, into the same tab.
@@ -253,7 +253,7 @@ def test_steering(browser):
         browser.value("wire.say({})")
         browser.value("document.getElementById('steer').open = true")
         check(hidden("newview") and not hidden("drive") and browser.value("document.getElementById('period').disabled"),
-              "who doesn't drive sees what is in force, and changes nothing")
+              "a viewer who doesn't drive sees what is in force, and changes nothing")
         browser.value("document.getElementById('drive').click()")
         check(asked() == [{"type": "drive"}], "a wish to drive")
         browser.value("wire.say({driver: 2})")
@@ -287,11 +287,11 @@ def test_steering(browser):
         check(rest_at(near) == [], "Auto leaves small angles alone")
         wishes = rest_at(far)
         check([wish["camera"]["position"] for wish in wishes] == [far["position"]], f"Auto asks once: {wishes}")
-        check(rest_at(far) == [], "and not again for the same view")
+        check(rest_at(far) == [], "Auto doesn't ask again for the same view")
         browser.value("wire.say({driver: 5})")
         check("Viewer 5" in browser.value("document.getElementById('driver').textContent") and hidden("newview"),
               "another viewer drives")
-        check(rest_at(azimuth(far, 30)) == [], "and this one asks for nothing")
+        check(rest_at(azimuth(far, 30)) == [], "a viewer who doesn't drive asks for nothing")
     browser.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
 
 

@@ -217,7 +217,7 @@ async function testConnection() {
   check(live.state === "live" && live.cause !== "" && live.shown?.frame === 16, "a damaged file costs nothing but itself");
   sendLevel(sockets[0], 31, 1, 9);
   await soon(20);
-  check(live.cause === "" && live.shown?.frame === 31, "and the next is shown");
+  check(live.cause === "" && live.shown?.frame === 31, "the frame after a damaged file is shown");
 
   // Acknowledgements of a large level.
   sockets[0].text({...level, frame: 32, bytes: 3 << 20});
@@ -229,15 +229,16 @@ async function testConnection() {
   sockets[0].end(1006);
   check(live.state === "lost" && live.retryAt > 0, "a lost connection");
   await soon(700);
-  check(sockets.length === 2, "it connects again");
+  check(sockets.length === 2, "a lost connection is made again");
   sockets[1].open();
-  check(sockets[1].sent[0].have === 31 && sockets[1].sent[0].session === "abc", "it says what it has");
+  check(sockets[1].sent[0].have === 31 && sockets[1].sent[0].session === "abc",
+        "a new connection says which frame the page has");
   sockets[1].text({...welcome, session: "other"});
   check(live.shown === undefined, "another server's frames are counted anew");
   sockets[1].bytes(part(32, 0, 2 << 20, new Uint8Array(9)));
   check(live.state === "lost" && sockets[1].readyState === 3, "a part of a level that was lost ends the connection");
   sockets[1].text({...level, frame: 99});
-  check(live.assembler.level === undefined, "what comes behind the end is nothing");
+  check(live.assembler.level === undefined, "what comes after the end begins no level");
   const wait = live.retryAt - performance.now();
   check(wait > 600 && wait <= 1000, `the second attempt waits for longer: ${wait}`);
 
@@ -248,7 +249,7 @@ async function testConnection() {
   sockets[2].end(4401);
   check(live.state === "refused" && live.cause.includes("token"), "a wrong token");
   await soon(700);
-  check(sockets.length === 3, "isn't tried again");
+  check(sockets.length === 3, "a wrong token isn't tried again");
   live.restart();
   sockets[3].open();
   sockets[3].text({...welcome, version: 2});
@@ -278,7 +279,7 @@ async function testLateDecoder() {
   give(1, 0, 1 << 18);
   check(acks(0) === "512", `the end of a level that waits isn't acknowledged: ${acks(0)}`);
   await soon(80);
-  check(acks(0) === "512,1024", `it is once the decoder takes it: ${acks(0)}`);
+  check(acks(0) === "512,1024", `the end of a level is acknowledged once the decoder takes it: ${acks(0)}`);
   give(1, 1 << 18, 1 << 20);
   check(acks(1) === "512,1024", `the next level's acknowledgements go on: ${acks(1)}`);
   live.close();
@@ -292,7 +293,7 @@ async function testSeries() {
   const wishes = () => sockets[0].sent.filter((m) => m.type !== "hello" && m.type !== "ack").map((m) => m.type + (m.index ?? "")).join();
   check(wishes() === "", "a frame that isn't there yet isn't asked for");
   sockets[0].text({type: "series", from: 3, times: [1], steps: [3]});
-  check(wishes() === "show3", "but once it is");
+  check(wishes() === "show3", "a frame is asked for once it is there");
   sendLevel(sockets[0], 3, 1, 1);
   await soon(20);
   live.pause();
@@ -331,13 +332,14 @@ async function testPause() {
   live.pause();
   check(asked() === "", "a paused coarse frame needs its finer levels");
   await give(1, 1);
-  check(seen() === "10,11" && asked() === "pause", `and gets them: ${asked()}`);
+  check(seen() === "10,11" && asked() === "pause", `a paused coarse frame gets its finer levels: ${asked()}`);
   await give(2, 0);
   await give(2, 1);
   check(seen() === "" && acks(2) === 2 && live.shown?.frame === 1, "another frame is acknowledged, and not shown");
   live.follow();
   await soon(20);
-  check(seen() === "21" && asked() === "pause,resume", "it is shown after the pause, as the server won't send it again");
+  check(seen() === "21" && asked() === "pause,resume",
+        "another frame is shown after the pause, as the server won't send it again");
 
   await give(3, 0);
   live.pause();
@@ -345,23 +347,26 @@ async function testPause() {
   check(asked() === "pause,resume,pause", `the server has gone on to another frame: ${asked()}`);
   socket.bytes(part(4, 0, 0, new Uint8Array([40, 0, 0, 0])));
   await soon(20);
-  check(seen() === "30" && acks(4) === 1, "which is kept off");
+  check(seen() === "30" && acks(4) === 1, "another frame is acknowledged, and kept off in the pause");
 
   check(reconnect({}) === null && asked() === "", "a coarse frame may become full after a reconnect");
   await give(5, 0);
-  check(seen() === "" && acks(5) === 1 && asked() === "pause", "or there is a newer one");
+  check(seen() === "" && acks(5) === 1 && asked() === "pause",
+        "a newer frame after a reconnect is acknowledged, and not shown");
   live.follow();
   await give(5, 1);
-  check(seen() === "50,51", "a level that was held back, and one that wasn't");
+  check(seen() === "50,51", "after the pause, the level held back is shown, then the next one");
 
   live.pause();
   check(reconnect({}) === 5 && asked() === "pause", `a full frame stays over a reconnect: ${asked()}`);
   await give(6, 0);
-  check(seen() === "" && live.shown?.frame === 5, "whatever comes before the server hears of the pause");
-  check(reconnect({session: "other"}) === 5 && live.shown?.frame === 5 && asked() === "pause", "a server that starts anew");
+  check(seen() === "" && live.shown?.frame === 5,
+        "a full frame stays, whatever comes before the server hears of the pause");
+  check(reconnect({session: "other"}) === 5 && live.shown?.frame === 5 && asked() === "pause",
+        "a full frame stays when a server starts anew");
   await give(5, 1);
-  check(seen() === "" && acks(5) === 1, "whose frame of the same number is another one");
-  check(reconnect({session: "other"}) === null, "and which the page doesn't have");
+  check(seen() === "" && acks(5) === 1, "a new server's frame of the same number isn't shown in the pause");
+  check(reconnect({session: "other"}) === null, "the page doesn't say that it has the new server's frame");
   await give(5, 1);
   live.follow();
   check(live.shown === undefined, "the former run's frame counts for nothing after the pause");
@@ -371,7 +376,7 @@ async function testPause() {
   sendLevel(socket, 7, 0, 70);
   live.pause();
   await soon(20);
-  check(seen() === "" && live.shown?.frame === 5, "a pause while the decoder works");
+  check(seen() === "" && live.shown?.frame === 5, "a pause keeps off the level that the decoder works on");
   live.show(7);
   await soon(20);
   check(seen() === "70" && !live.isPaused, "a frame that was held back is asked for");

@@ -236,7 +236,7 @@ def test_damage(browser):
     browser.value("window.former = vdiPage.vdi; 0")
     drop_files(browser, "full.vdi")
     browser.wait("vdiPage.vdi !== former")
-    check(browser.value("vdiPage.source.nameOf(0)") == "full.vdi", "and once more")
+    check(browser.value("vdiPage.source.nameOf(0)") == "full.vdi", "the same file can be opened once more")
     check(not browser.complaints(), f"damage: {browser.complaints()}")
 
     with open("compact.html", encoding="utf-8") as file:
@@ -272,7 +272,7 @@ def test_lost_context(browser):
     browser.value("vdiPage.setCamera({...vdiPage.viewer.camera}, false); extension.restoreContext()")
     browser.wait("!vdiPage.viewer.isLost")
     check(np.array_equal(shown(browser), before), "the picture comes back")
-    check(message_of(browser) == "", "and the message goes")
+    check(message_of(browser) == "", "the message of a lost context goes")
 
     script = browser.send("Page.addScriptToEvaluateOnNewDocument",
                           source="HTMLCanvasElement.prototype.getContext = () => null;")["identifier"]
@@ -318,7 +318,7 @@ def test_legend(browser):
     legend = browser.value("document.getElementById('legend').innerText").split()
     check(legend[:3] == ["velocity", "<b>,", "magnitude"], f"the colour bar's title: {legend}")
     numbers = set(legend[3:])
-    check({"-2.0", "12.5"} <= numbers <= {"-2.0", "12.5", "0", "5.0", "10.0"}, f"its numbers: {legend}")
+    check({"-2.0", "12.5"} <= numbers <= {"-2.0", "12.5", "0", "5.0", "10.0"}, f"the colour bar's numbers: {legend}")
     facts = browser.value("document.getElementById('facts').textContent")
     check("step 7" in facts and "t = 0.25" in facts, f"step and time: {facts}")
     picture = images.imread(io.BytesIO(browser.screenshot(os.path.join(PICTURES, "legend.png"))))

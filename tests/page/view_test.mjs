@@ -120,10 +120,11 @@ async function testScreenshot() {
   await viewer.screenshot();
   const isWhole = () => renderer.shown.every((row) => row === "7 at 1");
   check(isWhole(), "a screenshot shows the whole picture");
-  check(viewer.missing === "nothing" && rests() === 1, "which is one at rest");
+  check(viewer.missing === "nothing" && rests() === 1, "the picture of a screenshot is one at rest");
   clock.pass(2000);
-  check(isWhole(), `it stays, and no strips are put into an older one: ${new Set(renderer.shown).size} kinds of rows`);
-  check(rests() === 1, `and the view rests once: ${rests()} times`);
+  check(isWhole(),
+        `a screenshot's picture stays, and no strips are put into an older one: ${new Set(renderer.shown).size} kinds of rows`);
+  check(rests() === 1, `the view rests once after a screenshot: ${rests()} times`);
 }
 
 /** An element of this size, hands on it, and where the camera sees a point of the world. */

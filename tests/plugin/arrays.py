@@ -94,18 +94,20 @@ check(image.LookupTable == first_display.LookupTable, "the first array has the v
 
 image.SelectInputScalars = ["POINTS", "temperature"]
 check(image.LookupTable == simple.GetColorTransferFunction("temperature"), "another array takes its own map at once")
-check(range_of(image.LookupTable) == [1000, 2000], "over its range %s" % range_of(image.LookupTable))
+check(range_of(image.LookupTable) == [1000, 2000],
+      "another array's map has that array's range: %s" % range_of(image.LookupTable))
 simple.Render(view)
 on_screen = shown_picture(view)
-check(np.unique(on_screen.reshape(-1, 3), axis=0).shape[0] > 50, "it isn't a box of one colour")
+check(np.unique(on_screen.reshape(-1, 3), axis=0).shape[0] > 50, "another array isn't shown as a box of one colour")
 write_png("arrays_temperature.png", on_screen)
 expected = fresh_picture(ball, "temperature", view, ScalarOpacityUnitDistance=image.ScalarOpacityUnitDistance)
-check(np.abs(picture(image).astype(int) - expected).max() <= 1, "it is what a new filter shows")
-check(np.abs(picture(saved_map(image, "arrays.vdi")).astype(int) - expected).max() <= 1, "and what the file holds")
+check(np.abs(picture(image).astype(int) - expected).max() <= 1, "another array looks as in a new filter")
+check(np.abs(picture(saved_map(image, "arrays.vdi")).astype(int) - expected).max() <= 1,
+      "the saved file holds the other array's picture")
 
 colors, _ = set_colors("temperature", 1200, 1800)
 image.SelectInputScalars = ["POINTS", "a"]
-check(image.LookupTable == first_display.LookupTable, "the first one has its map again")
+check(image.LookupTable == first_display.LookupTable, "the first array has its map again")
 image.SelectInputScalars = ["POINTS", "temperature"]
 check(range_of(image.LookupTable) == [1200, 1800], "control points that were set stay")
 
@@ -116,26 +118,27 @@ image.SelectInputScalars = ["POINTS", "a"]
 check(image.LookupTable == own, "a map that a script has set stays for another array")
 image.LookupTable = None
 image.SelectInputScalars = ["POINTS", "flat"]
-check(image.LookupTable is None, "so does none")
+check(image.LookupTable is None, "a script's choice of no map stays for another array")
 picture(image)
-check(image.LookupTable is None, "also when it is updated")
+check(image.LookupTable is None, "a script's choice of no map survives an update")
 simple.Delete(image)
 
 # Vectors.
 image = simple.VolumetricDepthImage(Input=ball, SelectInputScalars=["POINTS", "velocity"])
-check(image.Component == -1, "by default it is the magnitude")
+check(image.Component == -1, "by default vectors show their magnitude")
 picture(image)
-check(range_of(image.LookupTable) == [0, round(14 ** 0.5, 4)], "over the magnitude's range %s" % range_of(image.LookupTable))
+check(range_of(image.LookupTable) == [0, round(14 ** 0.5, 4)],
+      "the map has the magnitude's range: %s" % range_of(image.LookupTable))
 image.Component = 2
 picture(image)
 check(range_of(image.LookupTable) == [-3, 3], "a component has its own range %s" % range_of(image.LookupTable))
-check(image.LookupTable.VectorMode == "Component" and image.LookupTable.VectorComponent == 2, "and the map names it")
+check(image.LookupTable.VectorMode == "Component" and image.LookupTable.VectorComponent == 2, "the map names the component")
 image.Component = -1
-check(image.LookupTable.VectorMode == "Magnitude" and range_of(image.LookupTable)[0] == 0, "as it names the magnitude")
+check(image.LookupTable.VectorMode == "Magnitude" and range_of(image.LookupTable)[0] == 0, "the map names the magnitude again")
 image.SelectInputScalars = ["POINTS", "rgb"]
 check(range_of(image.LookupTable)[1] > 255, "an RGB array shows its magnitude %s" % range_of(image.LookupTable))
 expected = fresh_picture(ball, "rgb", view, ScalarOpacityUnitDistance=image.ScalarOpacityUnitDistance)
-check(np.abs(picture(image).astype(int) - expected).max() <= 1, "as a new filter does")
+check(np.abs(picture(image).astype(int) - expected).max() <= 1, "an RGB array looks as in a new filter")
 simple.Delete(image)
 
 # Another input.
@@ -152,10 +155,10 @@ before = image.ScalarOpacityUnitDistance
 check(before == first_display.ScalarOpacityUnitDistance, "the volume's unit distance was taken")
 image.Input = other
 check(image.LookupTable == second.LookupTable != first_display.LookupTable, "another input brings its map")
-check(image.ScalarOpacityUnitDistance == second.ScalarOpacityUnitDistance != before, "and its unit distance")
+check(image.ScalarOpacityUnitDistance == second.ScalarOpacityUnitDistance != before, "another input brings its unit distance")
 image.ScalarOpacityUnitDistance = 0.75
 image.Input = ball
-check(image.ScalarOpacityUnitDistance == 0.75, "but one that was set stays")
+check(image.ScalarOpacityUnitDistance == 0.75, "a unit distance that was set stays when the input changes")
 check(image.LookupTable == first_display.LookupTable, "the map is the first input's again")
 
 # The queries of ParaView's range buttons, its histogram and its legends.
@@ -172,10 +175,11 @@ shown.SetScalarBarVisibility(view, True)
 bar = simple.GetScalarBar(image.LookupTable, view)
 check(bar.Visibility == 1 and bar.Title == "temperature", "the scalar bar says what it shows")
 simple.HideUnusedScalarBars(view)
-check(bar.Visibility == 1, "and stays where the volume is hidden")
+check(bar.Visibility == 1, "the scalar bar stays where the volume is hidden")
 image.LookupTable.RescaleTransferFunction(0, 1)
 shown.RescaleTransferFunctionToDataRange(False, True)
-check(range_of(image.LookupTable) == [1000, 2000], "Rescale to data range %s" % range_of(image.LookupTable))
+check(range_of(image.LookupTable) == [1000, 2000],
+      "Rescale to data range sets the array's range: %s" % range_of(image.LookupTable))
 table = image.LookupTable.SMProxy.ComputeDataHistogramTable(10)
 bins = np.array([table.GetColumn(1).GetValue(i) for i in range(table.GetNumberOfRows())])
 radius = np.sqrt(np.sum(np.square(np.meshgrid(*[np.linspace(-1, 1, 17)] * 3)), axis=0) / 3)
@@ -184,9 +188,10 @@ check(np.abs(bins / bins.sum() - expected / expected.sum()).max() < 0.03, "the h
 image.SelectInputScalars = ["POINTS", "a"]
 simple.Render(view)
 check(shown.LookupTable == image.LookupTable and list(shown.ColorArrayName) == ["FIELD", "a"], "the legend follows the array")
-check(simple.GetScalarBar(image.LookupTable, view).Visibility == 1 and bar.Visibility == 0, "and its bar replaces the other")
+check(simple.GetScalarBar(image.LookupTable, view).Visibility == 1 and bar.Visibility == 0,
+      "the new array's scalar bar replaces the other")
 shown.SetRepresentationType("Outline")
-check(not shown.ColorArrayName[1], "shown as something else, it isn't coloured by that")
+check(not shown.ColorArrayName[1], "a VDI that is shown as Outline isn't coloured by the array")
 image.SelectInputScalars = ["POINTS", "velocity"]
 image.Component = 1
 opened = saved_map(image, "arrays_velocity.vdi")
@@ -197,10 +202,10 @@ simple.Render(view)
 colors = file_shown.LookupTable
 check(list(file_shown.ColorArrayName) == ["FIELD", "velocity"], "an opened file has the legend of its array")
 check(range_of(colors) == range_of(image.LookupTable) and colors.VectorMode == "Component" and colors.VectorComponent == 1,
-      "with the range and the component %s" % range_of(colors))
-check(colors != image.LookupTable, "in maps of its own")
+      "an opened file's map has the range and the component of the array: %s" % range_of(colors))
+check(colors != image.LookupTable, "an opened file has a map of its own")
 file_shown.SetScalarBarVisibility(view, True)
-check(simple.GetScalarBar(colors, view).Title == "velocity", "and a scalar bar")
+check(simple.GetScalarBar(colors, view).Title == "velocity", "an opened file has a scalar bar of its array")
 simple.Delete(file_shown)
 simple.Delete(opened)
 
@@ -225,9 +230,10 @@ image.GetPointData().AddArray(array)
 moving = simple.VolumetricDepthImage(Input=steps, SelectInputScalars=["POINTS", "grows"])
 moving_shown = simple.Show(moving, view)
 simple.Render(view)
-check(range_of(moving.LookupTable) == [0, 10], "the first step's range %s" % range_of(moving.LookupTable))
+check(range_of(moving.LookupTable) == [0, 10], "the map has the first step's range: %s" % range_of(moving.LookupTable))
 moving_shown.RescaleTransferFunctionToDataRangeOverTime()
-check(range_of(moving.LookupTable) == [-2, 12], "over all time steps %s" % range_of(moving.LookupTable))
+check(range_of(moving.LookupTable) == [-2, 12],
+      "Rescale over all time steps sets the range of them all: %s" % range_of(moving.LookupTable))
 simple.Delete(moving_shown)
 simple.Delete(moving)
 image.SelectInputScalars = ["POINTS", "a"]
@@ -250,10 +256,10 @@ check(ends[0] < -3 and ends[1] == round(np.pi, 4), "the phase has its range over
 image.LookupTable.RescaleTransferFunction(0, 1)
 shown.RescaleTransferFunctionToDataRange(False, True)
 ends = range_of(image.LookupTable)
-check(ends[0] < -3 and ends[1] == round(np.pi, 4), "and that of the data, which aren't folded %s" % ends)
+check(ends[0] < -3 and ends[1] == round(np.pi, 4), "Rescale to data range keeps the phase's negative values: %s" % ends)
 table = image.LookupTable.SMProxy.ComputeDataHistogramTable(2)
 bins = [table.GetColumn(1).GetValue(i) for i in range(2)]
-check(0.8 < bins[0] / bins[1] < 1.25, "nor is their histogram %s" % bins)
+check(0.8 < bins[0] / bins[1] < 1.25, "the phase's histogram has about as many negative values as positive ones: %s" % bins)
 image.SelectInputScalars, image.Component = ["POINTS", "Q criterion"], -1
 
 # After a state file, which knows the map by a name without the space.
@@ -283,6 +289,7 @@ stack.Undo()
 servermanager.ProxyManager().UpdateRegisteredProxies(1)
 undone = simple.FindSource("undone")
 undone.SelectInputScalars = ["POINTS", "temperature"]
-check(undone.LookupTable == simple.GetColorTransferFunction("temperature"), "and takes another array's map after the undo")
+check(undone.LookupTable == simple.GetColorTransferFunction("temperature"),
+      "after the undo, the filter takes another array's map")
 vtkSMProxyManager.GetProxyManager().SetUndoStackBuilder(None)
 finish()

@@ -76,7 +76,8 @@ for association, names in (("POINTS", MODES), ("CELLS", ("Maximum Intensity", "I
         ours = picture(image)
         what = "%s of %s" % (name, association.lower())
         check(image.BlendMode == name.split(",")[0], what + ": the first update takes the mode, " + str(image.BlendMode))
-        check(list(image.IsosurfaceValues) == values and image.Shade == shade, what + ": and the values and the shading")
+        check(list(image.IsosurfaceValues) == values and image.Shade == shade,
+              what + ": the first update takes the values and the shading")
         off = np.abs(ours.astype(float) - theirs).mean()
         check(theirs.max() > 100 and ssim(ours, theirs) >= LEAST[name] and off < 2 and wrong_share(ours, theirs) < 0.05,
               "%s: SSIM with ParaView's own %.4f, mean difference %.2f" % (what, ssim(ours, theirs), off))
@@ -99,5 +100,5 @@ for mode in ("Maximum Intensity", "Minimum Intensity", "Isosurface"):
           "%s: a VDI refuses it in one message: %s" % (mode, " | ".join(said)))
 image.BlendMode = "Composite"
 said.clear()
-check(picture(image).max() > 100 and not said, "and Composite makes one again")
+check(picture(image).max() > 100 and not said, "Composite makes a VDI again after the other modes")
 finish()

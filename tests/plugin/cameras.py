@@ -121,13 +121,13 @@ for camera in range(3):
 print("first frames: %s s; device memory: %s MiB"
       % (" ".join("%.2f" % s for s in seconds), " ".join("%.1f" % m.max() for m in memory)))
 check((memory[1] - memory[0] <= 0.1 * memory[0]).all(), "a second camera takes a tenth of the first one's memory at most")
-check((memory[2] - memory[0] <= 0.1 * memory[0]).all(), "and so does a third")
+check((memory[2] - memory[0] <= 0.1 * memory[0]).all(), "with a third camera, the additional memory is still a tenth at most")
 first, second, third = images
 
 # Another camera, another array.
 first.CameraPosition = CAMERAS[2]
 check(same(lists(first), expected[2]) and not uploads(first), "a filter that moves uploads nothing")
-check(same(lists(second), expected[1]), "and the others keep their VDIs")
+check(same(lists(second), expected[1]), "the second filter keeps its VDI while the first one moves")
 first.CameraPosition = CAMERAS[0]
 lists(first)
 second.SelectInputScalars = ["POINTS", "Other"]
@@ -135,26 +135,29 @@ second.LookupTable, second.ScalarOpacityFunction = colors, opacity  # not that a
 check(same(lists(second), other) and uploads(second), "another array is uploaded")
 for image, camera in ((first, 0), (third, 2)):
     image.Supersegments = 8
-    check(same(lists(image), fewer[camera]) and not uploads(image), "the others go on with theirs, filter %d" % camera)
+    check(same(lists(image), fewer[camera]) and not uploads(image),
+          "the other filters go on with the first array, filter %d" % camera)
 second.SelectInputScalars = ["POINTS", "RTData"]
 second.LookupTable, second.ScalarOpacityFunction = colors, opacity
-check(same(lists(second), expected[1]) and not uploads(second), "back at that array, a filter shares it again")
-check((report(second)[1] - memory[2] <= 0.1 * memory[0]).all(), "and its own volume has gone")
+check(same(lists(second), expected[1]) and not uploads(second),
+      "a filter that is back at the first array shares its volume again")
+check((report(second)[1] - memory[2] <= 0.1 * memory[0]).all(), "the volume of the other array has gone")
 for image in (first, third):
     image.Supersegments = 25
     lists(image)
 
 # Another step.
 check(same(lists(first, 1.0), later[0]) and uploads(first), "a new step is uploaded")
-check((report(first)[1] - memory[2] <= 0.1 * memory[0]).all(), "in place of the last one")
-check(same(made(second), expected[1]), "which leaves the other's VDI")
-check(same(lists(second, 1.0), later[1]) and not uploads(second), "until that is at the step, too, without an upload")
+check((report(first)[1] - memory[2] <= 0.1 * memory[0]).all(), "a new step takes the last one's place in memory")
+check(same(made(second), expected[1]), "a new step leaves the second filter's VDI as it is")
+check(same(lists(second, 1.0), later[1]) and not uploads(second), "the second filter gets to the new step without an upload")
 third.Supersegments = 8
-check(same(lists(third, 0.0), fewer[2]), "a filter that is at another step gets it")
-check(same(lists(first, 1.0), later[0]) and same(lists(second, 1.0), later[1]), "and leaves the others at theirs")
+check(same(lists(third, 0.0), fewer[2]), "a filter at another step gets the VDI of that step")
+check(same(lists(first, 1.0), later[0]) and same(lists(second, 1.0), later[1]),
+      "a filter at another step leaves the others at theirs")
 third.Supersegments = 25
 for camera, image in enumerate(images):
-    check(same(lists(image, 0.0), expected[camera]), "all of them go back, filter %d" % camera)
+    check(same(lists(image, 0.0), expected[camera]), "all filters go back to the first step, filter %d" % camera)
 
 # In the background.
 for image in images:
@@ -165,21 +168,21 @@ for image in images:
 check(wait_for(images) == [100] * 3, "VDIs of several filters are prepared at the same time")
 for camera, image in enumerate(images):
     release(image)
-    check(same(lists(image), fewer[camera]), "each of them is right, filter %d" % camera)
+    check(same(lists(image), fewer[camera]), "each prepared VDI is right, filter %d" % camera)
 for image in images:
     command(image, "Hold")
     image.Supersegments = 25
 command(second, "Prepare")
 command(third, "Prepare")
 release(first)
-check(same(lists(first), expected[0]), "one that is made in place meanwhile is right, too")
+check(same(lists(first), expected[0]), "a VDI that is made in place meanwhile is right, too")
 third.Supersegments = 8
 command(third, "Hold")  # gives up what it has begun, or waits to begin
-check(wait_for([second]) == [100], "one that is given up holds up nobody")
+check(wait_for([second]) == [100], "a preparation that is given up holds up no other")
 release(third)
-check(same(lists(third), fewer[2]), "and makes what it is asked for next")
+check(same(lists(third), fewer[2]), "a filter that gave up a preparation makes the next VDI")
 release(second)
-check(same(lists(second), expected[1]), "the one before is taken")
+check(same(lists(second), expected[1]), "the second filter takes its prepared VDI")
 
 # Filters that go.
 second.Supersegments, third.Supersegments = 8, 25
@@ -190,16 +193,16 @@ simple.Delete(second)
 del images[1], second, image
 check(wait_for([third]) == [100], "a filter that goes while it makes a VDI lets the next one make its own")
 release(third)
-check(same(lists(third), expected[2]), "which is right")
+check(same(lists(third), expected[2]), "the VDI that follows a deleted filter's is right")
 simple.Delete(first)
 del images[0], first
 third.Supersegments = 8
 check(same(lists(third), fewer[2]) and not uploads(third), "the volume outlives the filter that has uploaded it")
 again = filter_at(0)
-check(same(lists(again), expected[0]) and not uploads(again), "and a new filter shares it")
+check(same(lists(again), expected[0]) and not uploads(again), "a new filter shares the volume that is left")
 simple.Delete(third)
 simple.Delete(again)
 del images, third, again
 last = filter_at(1)
-check(same(lists(last), expected[1]) and uploads(last), "it goes with the last filter")
+check(same(lists(last), expected[1]) and uploads(last), "the volume goes with the last filter")
 finish()

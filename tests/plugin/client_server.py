@@ -106,20 +106,21 @@ with Session() as session:
         print("a VDI {} on the server: SSIM {:.4f} to the same without a server".format(what, likeness))
         check(likeness > 0.99, "a VDI that is {} on the server is shown as without one".format(what))
         shown = bytes_of_orbit(session, view)
-        check(pvtest.ssim(screenshot(view, "client_server_turned.png"), turned) > 0.99, "orbiting turns it")
+        check(pvtest.ssim(screenshot(view, "client_server_turned.png"), turned) > 0.99, "orbiting turns the VDI")
         place = list(view.CameraPosition)
         view.CameraPosition = [0.6, 0.5, 0.4]
         simple.Render(view)
         said, help_said = pvtest.message_in(view), "Regenerate From This View" if what == "made" else "Reset Camera"
-        check(said == "From inside, this VDI is rough: press {}.".format(help_said), "from inside it says what helps")
+        check(said == "From inside, this VDI is rough: press {}.".format(help_said),
+              "from inside, the view says which button helps")
         view.CameraPosition = place
         simple.Render(view)
-        check(pvtest.message_in(view) == "", "and nothing from outside")
+        check(pvtest.message_in(view) == "", "from outside, the view shows no message")
         simple.Hide(view.Representations[0].Input, view)
         simple.Render(view)
         hidden = bytes_of_orbit(session, view)
         print("an orbit sends {} bytes, {} with the VDI hidden: ParaView's own words about each frame".format(shown, hidden))
-        check(shown == hidden and shown < 5000, "and sends nothing of the VDI or of pictures")
+        check(shown == hidden and shown < 5000, "orbiting sends nothing of the VDI or of pictures")
 
     # A volume is drawn on the server's ranks: the view says why the VDI isn't, and shows it when the volume is gone.
     view = pvtest.make_view(SIZE, CAMERA, CENTER)
@@ -147,7 +148,8 @@ with Session() as session:
         simple.Show(image, view)
         simple.Hide(image.Input, view)
         picture = screenshot(view, "client_server_volume_hidden.png")
-        check(pvtest.message_in(view) == "" and pvtest.ssim(picture, alone) > 0.99, order + ": and without it the VDI again")
+        check(pvtest.message_in(view) == "" and pvtest.ssim(picture, alone) > 0.99,
+              order + ": without the volume, the VDI is seen again")
 
 with open(LOG) as log:
     said = log.read()

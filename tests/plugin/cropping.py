@@ -51,7 +51,7 @@ for name, shade in (("unshaded", 0), ("shaded", 1)):
     ours = picture(image)
     box = drawn_box(view)
     check(image.Cropping == 1 and np.allclose(image.CroppingBox, box), name + ": the first update takes the volume's box")
-    check(image.Shade == shade, name + ": and its shading")
+    check(image.Shade == shade, name + ": the first update takes the volume's shading")
     off = np.abs(ours.astype(float) - theirs).mean()
     check(theirs.max() > 100 and ssim(ours, theirs) >= 0.99 and off < 1.5,
           "%s: SSIM with ParaView's own %.4f, mean difference %.2f" % (name, ssim(ours, theirs), off))
@@ -66,9 +66,10 @@ own = vdi_filter(source, view, "CELLS", "field", 2.0, Resolution=[16, 12], Cropp
                  IsosurfaceValues=[150], Lights=own_lights)
 own.UpdatePipeline()
 check(own.Cropping == 0 and list(own.CroppingBox) == own_box, "a box that was set before the first update stays")
-check(own.Shade == 0 and own.Diffuse == 0.5, "and so does the shading")
-check(own.BlendMode == "Composite" and list(own.IsosurfaceValues) == [150], "and the blending")
-check(list(own.Lights) == own_lights, "and the lights")
+check(own.Shade == 0 and own.Diffuse == 0.5, "the shading stays as it was before the first update")
+check(own.BlendMode == "Composite" and list(own.IsosurfaceValues) == [150],
+      "the blending stays as it was before the first update")
+check(list(own.Lights) == own_lights, "the lights stay as they were before the first update")
 representation.BlendMode = "Composite"
 
 # The same box by planes.
@@ -84,7 +85,8 @@ clipped = picture(vdi_filter(source, view, "CELLS", "field", 2.0, Shade=1, Clipp
 check(np.abs(clipped.astype(int) - ours).max() <= 2, "six clipping planes show what the box shows")
 whole = vdi_filter(source, view, "CELLS", "field", 2.0, Shade=1)
 viewed = picture(simple.RenderVDI(Input=whole, UseOriginalCamera=1, ClippingPlanes=planes))
-check(ssim(viewed, ours) >= 0.97, "and views of the whole VDI show that about too: SSIM %.4f" % ssim(viewed, ours))
+check(ssim(viewed, ours) >= 0.97,
+      "clipped views of the whole VDI show about what the box shows: SSIM %.4f" % ssim(viewed, ours))
 write_png("cropping_viewed.png", np.hstack([viewed, ours]))
 
 # Modes that the filter can't show.

@@ -86,11 +86,15 @@ renderer.ResetCamera(5, 9, -2, 2, -5, -1)
 camera = renderer.GetActiveCamera()
 as_reset = filter_of(source, CameraPosition=list(camera.GetPosition()), CameraFocalPoint=list(camera.GetFocalPoint()))
 check(seen.max() > 60, "without a camera there is something to see")
-check(seen[0].max() == 0 and seen[-1].max() == 0 and seen[:, 0].max() == 0, "and all of the scene is in the picture")
-check(np.abs(seen.astype(int) - picture(as_reset)).max() <= 1, "it is where vtkRenderer.ResetCamera puts it")
-check(list(image.CameraPosition) == list(image.CameraFocalPoint), "and the properties stay those of a camera not set")
+check(seen[0].max() == 0 and seen[-1].max() == 0 and seen[:, 0].max() == 0,
+      "without a camera, all of the scene is in the picture")
+check(np.abs(seen.astype(int) - picture(as_reset)).max() <= 1,
+      "without a camera, the scene is where vtkRenderer.ResetCamera puts it")
+check(list(image.CameraPosition) == list(image.CameraFocalPoint),
+      "without a camera, the properties stay those of a camera not set")
 parallel = picture(filter_of(source, CameraParallelProjection=1))
-check(parallel.max() > 60 and parallel[0].max() == 0, "so it is in parallel projection")
+check(parallel.max() > 60 and parallel[0].max() == 0,
+      "without a camera, the scene is in the picture in parallel projection, too")
 made = filter_of(source, CameraPosition=[15, 4, 4], CameraFocalPoint=[7, 0, -3])
 check(np.abs(picture(simple.RenderVDI(Input=made)).astype(int) - picture(made)).max() <= 2,
       "RenderVDI without a camera looks from where the VDI was made")
@@ -107,7 +111,7 @@ for what, position, focal_point, word in (
         rendered.CameraPosition = [p + 0.01 for p in position]
         rendered.UpdatePipeline()
     check(len(first) == 1, "a viewpoint %s gets a warning" % what)
-    check(len([text for text in texts if word in text]) == 1, "and only one")
+    check(len([text for text in texts if word in text]) == 1, "a viewpoint %s gets only one warning" % what)
 with Messages("WarningEvent") as texts:
     simple.RenderVDI(Input=made, UseOriginalCamera=1, Azimuth=20).UpdatePipeline()
 check(not texts, "a viewpoint near the VDI's own gets none")
@@ -124,12 +128,13 @@ for association, name, words in (
             wrong.UpdatePipeline(0.0)
         missing = [word for word in words if word not in "".join(texts)]
         check(not missing, "%s of %s: the %s error says what there is %s" % (name, association, attempt, missing))
-        check(len(texts) == 1, "and it is the only one: %d" % len(texts))
-        check(not errors_of(wrong), "which isn't repeated as long as it stays wrong")
+        check(len(texts) == 1, "%s of %s: the %s error is the only one: %d" % (name, association, attempt, len(texts)))
+        check(not errors_of(wrong),
+              "%s of %s: the %s error isn't repeated as long as the array stays wrong" % (name, association, attempt))
         wrong.SelectInputScalars = ["POINTS", "ball"]
-        check(not errors_of(wrong), "another array is fine")
+        check(not errors_of(wrong), "after a wrong array, another one is fine")
         wrong.SelectInputScalars = [association, name]
-check(not errors_of(filter_of(source, "CELLS", "layers")), "cells where there are cells are fine")
+check(not errors_of(filter_of(source, "CELLS", "layers")), "an array of cells is fine")
 
 
 # Colour maps: the default keeps its first range, whoever updates; set points stay.
@@ -159,9 +164,9 @@ moving.GetClientSideObject().SetOutput(renamed(field([0, 0, 0], scale=0.5), "kep
 moving.MarkModified(moving.SMProxy)
 second = saved(written, "kept_1.vdi")
 check(range_of("kept") == [0, 4, 0, 4] and np.abs(first.astype(int) - second).max() > 30,
-      "and keeps it when the values get smaller")
+      "a map that nobody set keeps its range when the values get smaller")
 written.UpdatePipeline()
-check(range_of("kept") == [0, 4, 0, 4], "also when the filter is updated")
+check(range_of("kept") == [0, 4, 0, 4], "a map that nobody set keeps its range when the filter is updated")
 written.LookupTable = None
 before = picture(written)
 moving.GetClientSideObject().SetOutput(renamed(field([0, 0, 0], scale=0.25), "kept"))
@@ -179,7 +184,7 @@ simple.GetOpacityTransferFunction("preset").Points = [0, 0, 0.5, 0, 2, 1, 0.5, 0
 filter_of(producer_of(renamed(field([0, 0, 0]), "preset")), name="preset").UpdatePipeline()
 check(range_of("preset") == [0, 4, 0, 2], "a preset waits for the range, opacities set beside it don't move")
 check(not errors_of(filter_of(source, "POINTS", "velocity", Component=0)), "a component is rendered")
-check(range_of("velocity") == [-1, 3, -1, 3], "and its map has the range of the component, not of the magnitude")
+check(range_of("velocity") == [-1, 3, -1, 3], "the map of a component has the component's range, not the magnitude's")
 
 # Data without arrays.
 bare = vtkImageData()

@@ -65,21 +65,22 @@ image.SMProxy.InvokeCommand("DeferViews")
 wavelet.XFreq = 20  # other blocks
 simple.Render(view)
 check(asked(image, "Outdated") == 1 and same(codes(image), first), "a deferred view shows the VDI made last")
-check(prepare(image) == 100, "what it asks for is prepared")
+check(prepare(image) == 100, "the VDI that a deferred view asks for is prepared")
 release_and_render(image, view)
 second = codes(image)
-check(asked(image, "Outdated") == 0 and second is not None and not same(second, first), "and is shown then")
+check(asked(image, "Outdated") == 0 and second is not None and not same(second, first),
+      "a prepared VDI is shown after the release")
 
 wavelet.XFreq = 30
 simple.Render(view)
 check(asked(image, "Outdated") == 1, "other blocks are asked for")
 image.SMProxy.InvokeCommand("Hold")  # gives up what is prepared, as an edit does
 release_and_render(image, view)
-check(asked(image, "Outdated") == 1, "what was given up stays asked for")
+check(asked(image, "Outdated") == 1, "a VDI that was given up stays asked for")
 image.UpdatePipeline()
-check(asked(image, "Outdated") == 0, "an update by anybody else makes it")
+check(asked(image, "Outdated") == 0, "an update by another caller makes the VDI that was asked for")
 third = codes(image)
-check(third is not None and not same(third, second), "of the new blocks")
+check(third is not None and not same(third, second), "the update makes the VDI of the new blocks")
 
 image.Supersegments = 8
 simple.Render(view)
@@ -111,8 +112,8 @@ check(updates == [1] and same(codes(image), first), "a view shows the step befor
 check(prepare(image) == 100, "the step is prepared")
 release_and_render(image, view)
 second = codes(image)
-check(updates == [1, 0] and second is not None and not same(second, first), "and is shown then")
-check(second is None or made_at(image) == 1.0, "as that of its time")
+check(updates == [1, 0] and second is not None and not same(second, first), "a prepared step is shown after the release")
+check(second is None or made_at(image) == 1.0, "the prepared step's VDI has the time of the step")
 image.SMProxy.InvokeCommand("DeferNoViews")
 for time_step, deferred in ((0.0, first), (1.0, second)):
     image.UpdatePipeline(time_step)

@@ -94,15 +94,15 @@ image.SMProxy.InvokeCommand("Hold")
 image.ScalarOpacityFunction = simple.CreatePiecewiseFunction(Points=[37, 0, 0.5, 0, 277, 0.2, 0.5, 0])
 image.UpdatePipeline()
 check(np.abs(picture(image).astype(int) - first).max() <= 1, "while it is held, the filter keeps what it has")
-check(prepare(image) == 100, "what is prepared gets there")
+check(prepare(image) == 100, "the preparation gets to its end")
 image.SMProxy.InvokeCommand("Release")
 image.SMProxy.MarkDirty(image.SMProxy)
 taken = picture(image)
-check(np.abs(taken.astype(int) - first).max() > 30, "which shows the other opacity")
+check(np.abs(taken.astype(int) - first).max() > 30, "the prepared VDI shows the other opacity")
 image.SamplingRate = 2
 picture(image)
 image.SamplingRate = 0
-check(np.array_equal(picture(image), taken), "as an update without a preparation does")
+check(np.array_equal(picture(image), taken), "an update without a preparation makes the same VDI")
 # A preparation that is given up, and one whose filter is deleted before it ends.
 image.Supersegments, image.Resolution, image.SamplingRate = 40, [400, 300], 4
 image.SMProxy.InvokeCommand("Prepare")

@@ -65,11 +65,11 @@ segments = fields.GetArray("VDI.codes").GetNumberOfTuples()
 check(last[:4] == [120, 90, 0, 25] and last[4] in (1, 2, 4) and last[5:13] == [1, 0, 1, 1, 1, 0, 0, 1] and
       last[13:15] == [120 * 90, segments],
       "the last VDI's numbers are those of its settings and lists: {}".format(last))
-check(last[15] > 0 and last[16] >= 0, "and what it took")
+check(last[15] > 0 and last[16] >= 0, "the last VDI's numbers say what it took")
 image.Resolution, image.Margin, image.Precision = [240, 180], 0.25, 0
 image.UpdatePipeline()
 larger = last_vdi(image)
-check(larger[0:3] == [240, 180, 0.25] and larger[8] == 0, "and those of the next one")
+check(larger[0:3] == [240, 180, 0.25] and larger[8] == 0, "the numbers become those of the next VDI")
 growth = larger[13] / last[13]
 check(growth >= 4 and abs(larger[14] / last[14] / growth - 1) < 0.1,
       "supersegments grow with lists: {:.2f} times as many in {:.2f}".format(larger[14] / last[14], growth))
@@ -84,7 +84,7 @@ read = simple.OpenDataFile(path)
 check(np.array_equal(picture(read), flat), "a saved VDI reads back as it was")
 read.SMProxy.UpdatePropertyInformation()
 viewpoint = [read.SMProxy.GetProperty("Viewpoint").GetElement(i) for i in range(12)]
-check(np.allclose(viewpoint[:6], list(POSITION) + list(FOCAL_POINT)), "and says where it was made from")
+check(np.allclose(viewpoint[:6], list(POSITION) + list(FOCAL_POINT)), "a saved VDI says where it was made from")
 for source in (image, read):
     rendered = with_camera(simple.RenderVDI(Input=source))
     worst = np.abs(picture(rendered).astype(int) - flat).max()
@@ -99,7 +99,7 @@ extractor = simple.CreateExtractor("VDIPage", image, registrationName="page")
 extractor.Writer.FileName = "extracted_{timestep:03d}.html"
 simple.SaveExtracts(ExtractsOutputDirectory=OUTPUT)
 read = simple.OpenDataFile(vdi_in_page(os.path.join(OUTPUT, "extracted_000.html"), os.path.join(OUTPUT, "extracted.vdi")))
-check(np.array_equal(picture(read), flat), "and so has an extracted page")
+check(np.array_equal(picture(read), flat), "an extracted page has the VDI")
 simple.Delete(extractor)
 nowhere = os.path.join(OUTPUT, "no", "folder", "x.html")
 check(errors_of(lambda: simple.SaveData(nowhere, proxy=image)), "a page that can't be written is an error")
@@ -113,7 +113,8 @@ check(worst <= 2, "from V_O a VDI is the volume's own picture, off by %d" % wors
 for precision in ("Full", "Compact"):
     searched = picture(vdi_of(wavelet, Algorithm="Bisection", Supersegments=2, Precision=precision))
     worst = np.abs(searched - volume).max()
-    check(worst <= 2, "so it is by bisection, in %s precision, off by %d" % (precision.lower(), worst))
+    check(worst <= 2,
+          "from V_O a VDI by bisection, in %s precision, is the volume's own picture, off by %d" % (precision.lower(), worst))
 
 # Zoomed in, a margin keeps what lies beyond the picture; the picture stays.
 near = {"CameraViewAngle": 6, "Resolution": [60, 45]}
@@ -132,7 +133,7 @@ check(black[0] > 0.01 and black[1] < 0.001, "turned by 20 degrees, %.1f %% are m
       % (100 * black[0], 100 * black[1]))
 
 by_need = vdi_of(wavelet, Supersegments=6, Budget="Total", Fill=0.5)
-check(np.abs(picture(by_need) - volume).max() <= 2, "so it is with a total budget")
+check(np.abs(picture(by_need) - volume).max() <= 2, "from V_O a VDI with a total budget is the volume's own picture")
 equal_share = vdi_of(wavelet, Supersegments=6)
 
 
@@ -143,7 +144,7 @@ def supersegments(vdi):
 
 
 share = supersegments(by_need).sum() / supersegments(equal_share).sum()
-check(0.4 < share < 0.6, "which makes half of the supersegments, %.2f" % share)
+check(0.4 < share < 0.6, "a total budget that is filled by half makes half of the supersegments, %.2f" % share)
 check(len(np.unique(supersegments(by_need))) > 3, "lists hold as many as they need")
 full = vdi_of(wavelet, Precision="Full", TerminationOpacity=0.9999)  # as PictureOnly ends its rays
 check(np.array_equal(picture(full), volume), "full precision gives the same picture to the bit")
@@ -171,7 +172,7 @@ for position, view_up, degrees in OBLIQUE:
     worst = np.abs(turned - picture(simple.RenderVDI(Input=oblique, **there))).max()
     check(worst <= 1, "azimuth is vtkCamera's from %s with view-up %s, off by %d" % (position, view_up, worst))
     similar = ssim(turned.astype(np.uint8), picture(vdi_of(wavelet, PictureOnly=1, **there)))
-    check(similar > 0.97, "which is volume rendering from there, SSIM %.4f" % similar)
+    check(similar > 0.97, "a turned view is volume rendering from there, SSIM %.4f" % similar)
 
 # A series is time steps.
 second = os.path.join(OUTPUT, "series_1.vdi")
@@ -217,24 +218,27 @@ def shown_at(proxy, at):
 
 listed = simple.OpenDataFile(listing.name)
 check(times_of(listed) == [0, 10, 20, 30], "a .vdi.series file has the times that it says %s" % times_of(listed))
-check(all(np.array_equal(shown_at(listed, 10.0 * step), pictures[step]) for step in (3, 0, 2)), "and the pictures")
+check(all(np.array_equal(shown_at(listed, 10.0 * step), pictures[step]) for step in (3, 0, 2)),
+      "a .vdi.series file has the pictures of its times")
 opened = simple.VDIReader(FileNames=names)
 check(times_of(opened) == TIMES, "a series has its files' times")
-check(np.array_equal(shown_at(opened, 4.5), pictures[1]), "and their pictures")
+check(np.array_equal(shown_at(opened, 4.5), pictures[1]), "a series has its files' pictures")
 os.remove(names[1])
 opened.MarkModified(opened.SMProxy)
 check(times_of(opened) == TIMES, "a file that goes leaves its time")
 later = simple.VDIReader(FileNames=names)
-check(times_of(later) == [2, 3.5, 5, 7], "one that was never there gets a time between %s" % times_of(later))
+check(times_of(later) == [2, 3.5, 5, 7], "a file that was never there gets a time between the others', %s" % times_of(later))
 for what, proxy, missing in (("that goes", opened, 4.5), ("that was never there", later, 3.5)):
-    check(np.array_equal(shown_at(proxy, 5.0), pictures[2]), "the others are shown with one " + what)
+    check(np.array_equal(shown_at(proxy, 5.0), pictures[2]), "the other files are shown beside one " + what)
     said = errors_of(lambda: proxy.UpdatePipeline(missing))
     check(len(said) == 1, "a file %s is one error, %d" % (what, len(said)))
-    check(shown_at(proxy, missing) is None and np.array_equal(shown_at(proxy, 7.0), pictures[3]), "and only that step is lost")
+    check(shown_at(proxy, missing) is None and np.array_equal(shown_at(proxy, 7.0), pictures[3]),
+          "a file %s loses only its own step" % what)
 os.remove(names[0])
 first_lost = simple.VDIReader(FileNames=names[:1] + names[2:])
-check(times_of(first_lost) == [3, 5, 7], "so it is where the first file isn't there %s" % times_of(first_lost))
-check(np.array_equal(shown_at(first_lost, 5.0), pictures[2]), "whose others are shown")
+check(times_of(first_lost) == [3, 5, 7],
+      "a first file that isn't there gets a time before the others', %s" % times_of(first_lost))
+check(np.array_equal(shown_at(first_lost, 5.0), pictures[2]), "the other files are shown where the first one isn't there")
 
 
 # Values are uploaded when they're new, and only then.
@@ -263,7 +267,7 @@ producer.GetClientSideObject().SetOutput(grid)
 watched = vdi_of(producer, CameraFocalPoint=[12, 12, 12])
 check(upload_seconds(watched) > 0, "new values take an upload")
 check(changed_by(watched, lambda: setattr(watched, "CameraPosition", [50, 60, 75])) > 8, "another camera: another picture")
-check(upload_seconds(watched) == 0, "and no upload")
+check(upload_seconds(watched) == 0, "another camera takes no upload")
 
 
 def overwrite(*modified):
@@ -274,7 +278,8 @@ def overwrite(*modified):
 
 
 check(changed_by(watched, lambda: overwrite(in_place)) > 8, "values overwritten in an array: another picture")
-check(changed_by(watched, lambda: overwrite(producer.GetClientSideObject())) > 8, "so it is when only their source says so")
+check(changed_by(watched, lambda: overwrite(producer.GetClientSideObject())) > 8,
+      "values that their source alone says are new: another picture")
 check(changed_by(watched, lambda: setattr(watched, "FillGhosts", 0)) == 0, "ghost layers that nothing lacks change nothing")
 check(changed_by(watched, lambda: setattr(watched, "Input", wavelet)) > 8, "another input: another picture")
 
@@ -298,7 +303,7 @@ check(np.array_equal(picture(aborted), kept), "an abort leaves the picture that 
 algorithm.RemoveObserver(observer)
 algorithm.SetAbortExecute(0)
 aborted.CameraPosition = [50, 60, 76]
-check(not np.array_equal(picture(aborted), kept), "and what is asked for next is made")
+check(not np.array_equal(picture(aborted), kept), "after an abort, the next VDI is made")
 
 # Bad input: an error, not a crash, and the next thing works.
 check(errors_of(lambda: vdi_of(simple.Tetrahedralize(Input=wavelet)).UpdatePipeline()), "an unstructured grid is refused")

@@ -45,7 +45,8 @@ for name, (layout, kind, as_cells, scale) in VARIANTS.items():
         check(worst <= 2, "%s: the flat picture equals one rank's, worst channel off by %d" % (name, worst))
         # Colour and alpha are rounded apart, so that a twentieth of a step can become two.
         off = np.abs(from_vdi.astype(int) - truth)
-        check(off.max() <= 2 and off.mean() < 0.05, "%s: so does the VDI rendered from its own viewpoint, off by %d at most, "
+        check(off.max() <= 2 and off.mean() < 0.05,
+              "%s: the VDI rendered from its own viewpoint equals one rank's picture, off by %d at most, "
               "%.4f on average" % (name, off.max(), off.mean()))
         if theirs is not None:
             print("%s: wrong by more than 16/255 of the object's pixels: ours %.2f %%, ParaView's own %.2f %%"

@@ -107,7 +107,7 @@ for ratio in (2, 4):
     blocks.SetBlock(0, grid_of(zero, one, [n] * 3, coarse.ravel(), flags.ravel()))
     blocks.SetBlock(1, grid_of(lo, hi, [16] * 3, fine))
     worst = np.abs(picture_of(blocks) - truth).max()
-    check(worst <= 2, "refined cells under a finer block, ratio %d: likewise, off by %d" % (ratio, worst))
+    check(worst <= 2, "refined cells under a finer block, ratio %d: the picture of a uniform grid, off by %d" % (ratio, worst))
 
 # Hidden cells and points aren't drawn, and don't bleed into what's beside them.
 n = 16
@@ -171,9 +171,11 @@ def says(text, name):
 short = points_of([n + 1] * 3, values[:-2])
 check(says(errors_of(lambda: update_with_second(short, "POINTS")), "f"), "a short array is refused, with its name and block")
 short = points_of([n + 1] * 3, values, flags[:-2])
-check(says(errors_of(lambda: update_with_second(short, "POINTS")), "vtkGhostType"), "so is a short vtkGhostType of points")
+check(says(errors_of(lambda: update_with_second(short, "POINTS")), "vtkGhostType"),
+      "a short vtkGhostType of points is refused, with its block")
 short = grid_of(zero, one, [n] * 3, np.zeros(n ** 3), half.ravel()[:-5])
-check(says(errors_of(lambda: update_with_second(short, "CELLS")), "vtkGhostType"), "and one of cells")
+check(says(errors_of(lambda: update_with_second(short, "CELLS")), "vtkGhostType"),
+      "a short vtkGhostType of cells is refused, with its block")
 check(np.abs(picture_of(points_of([n // 2 + 1, n + 1, n + 1], values[:, :, : n // 2 + 1]), "POINTS") - left).max() == 0,
       "after all that, a picture is made as before")
 finish()

@@ -51,14 +51,15 @@ check(os.path.exists(LOSE) and pvtest.ssim(before, same) == 1.0, "a frame like t
 view.CameraPosition = [2.2, 1.9, 2.5]
 after = look(view)
 check(not os.path.exists(LOSE), "a device is lost in a frame at rest")
-check(pvtest.ssim(beside, after) > 0.999 and not pvtest.message_in(view), "and that very frame shows the VDI, on a new device")
+check(pvtest.ssim(beside, after) > 0.999 and not pvtest.message_in(view),
+      "the frame that loses the device shows the VDI, on a new one")
 view.CameraPosition = camera
 orbit(view)
 open(LOSE, "w").close()
 orbit(view)
 check(not os.path.exists(LOSE) and not pvtest.message_in(view), "a device is lost while orbiting, and there is no message")
 view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = camera, CENTER, [0, 1, 0]
-check(pvtest.ssim(before, look(view)) > 0.999, "and the VDI is still there")
+check(pvtest.ssim(before, look(view)) > 0.999, "the VDI is still shown after a device was lost while orbiting")
 
 open(LOSE, "w").close()
 view.ViewTime = reader.TimestepValues[1]
@@ -71,7 +72,7 @@ view.ViewTime = reader.TimestepValues[1]
 simple.Render(view)
 orbit(view)
 check("lost" in pvtest.message_in(view).lower(), "where every device is lost, the view says so")
-check(look(view).std() > 5, "and shows that")
+check(look(view).std() > 5, "where every device is lost, screenshots show the message")
 os.rmdir(LOSE)
 view.ViewTime = reader.TimestepValues[0]
 view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = camera, CENTER, [0, 1, 0]
@@ -97,5 +98,5 @@ open(LOSE, "w").close()
 image.SamplingRate = 1.5
 finer = look(view)
 check(not os.path.exists(LOSE) and not pvtest.message_in(view), "a device that is lost in a filter leaves no message")
-check(pvtest.ssim(made, finer) > 0.95, "and the filter's next VDI is shown, made on a new device")
+check(pvtest.ssim(made, finer) > 0.95, "the filter's next VDI after a lost device is shown, made on a new one")
 pvtest.finish()

@@ -104,7 +104,7 @@ def flat_picture(image, view, camera, what):
     check(expected.std() > 20 and off <= 3, "Slice has the picture's place and its colours, {}".format(what))
     display.Opacity = 0.5
     half = np.abs(2 * screenshot(view, what + "_half").astype(int) - seen).max()
-    check(half <= 3, "Opacity 0.5 shows it half as opaque, {}".format(what))
+    check(half <= 3, "Opacity 0.5 shows Slice half as opaque, {}".format(what))
     display.Opacity = 1
     # From above the viewpoint's axis is seen from its side, and so is the rectangle: a line through the middle.
     position, up = np.array(camera, float), np.array([0.0, 1, 0])
@@ -115,7 +115,7 @@ def flat_picture(image, view, camera, what):
     above = screenshot(view, what + "_above")
     first, last = seen_box(above)[:2]
     check(last - first < 24 and abs(first + last - SIZE[1]) < 60,
-          "and stands in the middle of the scene: rows {} to {}".format(first, last))
+          "Slice stands in the middle of the scene: rows {} to {}".format(first, last))
     simple.Hide(image, view)
 
 

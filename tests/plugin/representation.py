@@ -65,7 +65,7 @@ def volume_beside_vdi():
             display = simple.Show(image, view)
             check(display.Representation == "VDI", "Show alone shows the filter's output as a VDI")
             check(list(display.ColorArrayName) == ["FIELD", "RTData"] and display.LookupTable == image.LookupTable,
-                  "and has the legend of its array")
+                  "the filter's output has the legend of its array")
         pictures[shown, "alone"] = screenshot(view, shown + "_alone", CAMERA)
         if shown == "vdi":
             display.Opacity = 0.5
@@ -80,7 +80,7 @@ def volume_beside_vdi():
     compare(pictures["vdi", "alone"], pictures["volume", "alone"], 0.99, "a VDI from its viewpoint, as Volume")
     for what in ("sphere", "plane"):
         compare(pictures["vdi", what], pictures["volume", what], 0.99, "with a {} in it, as Volume".format(what))
-        check(pvtest.ssim(pictures["vdi", what], pictures["vdi", "alone"]) < 0.97, "and that is seen")
+        check(pvtest.ssim(pictures["vdi", what], pictures["vdi", "alone"]) < 0.97, "the {} in the VDI is seen".format(what))
     simple.SaveData(VDI, proxy=image)
     simple.Delete(view)
 

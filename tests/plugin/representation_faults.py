@@ -59,12 +59,14 @@ with open(steps[4], "r+b") as file:
 view.GetActiveCamera().Azimuth(1)
 simple.Render(view)
 view.GetActiveCamera().Azimuth(-1)
-check(pvtest.ssim(look(view, "damaged"), before) > 0.999 and not pvtest.message_in(view), "what has been read is still shown")
+check(pvtest.ssim(look(view, "damaged"), before) > 0.999 and not pvtest.message_in(view),
+      "a VDI that was read before its file was damaged is still shown")
 simple.ReloadFiles(reader)
 look(view, "reloaded")
-check(pvtest.message_in(view) != "", "and read again, the damaged file gets a message")
+check(pvtest.message_in(view) != "", "when it is read again, the damaged file gets a message")
 scene.AnimationTime = reader.TimestepValues[0]
-check(look(view, "after").std() > 5 and not pvtest.message_in(view), "and the next step none")
+check(look(view, "after").std() > 5 and not pvtest.message_in(view),
+      "the step after the damaged file is shown, without a message")
 
 # A view that is closed while a VDI is loaded for it, whose last frame showed the one before.
 for _ in range(3):
@@ -78,13 +80,13 @@ for _ in range(3):
 check(look(view, "closed").std() > 5, "a view that is closed while a VDI is loaded leaves the other one as it is")
 
 simple.Hide(reader, view)
-check(not pvtest.message_in(view), "what is hidden says nothing")
+check(not pvtest.message_in(view), "a hidden VDI has no message")
 empty = simple.OpenDataFile(make("empty.vdi", "--resolution", "64x64", "--position", "9", "9", "9", "--focal-point", "10", "10",
                                  "10", "--view-up", "0", "1", "0"))
 simple.Show(empty, view)
 simple.Render(view)
 check("shows nothing" in pvtest.message_in(view), "a VDI that is empty says so")
-check(look(view, "empty").std() < 1, "and pictures that are taken show nothing")
+check(look(view, "empty").std() < 1, "screenshots of a VDI that is empty show nothing")
 simple.Render(view)
 wavelet = simple.Wavelet()
 check("VDI" not in simple.Show(wavelet, view).GetProperty("Representation").Available,
@@ -94,13 +96,14 @@ picture = simple.VolumetricDepthImage(Input=wavelet, Resolution=[64, 48], Pictur
 simple.Show(picture, view)
 simple.Render(view)
 said = pvtest.message_in(view)
-check("no VDI in this data set" in said and "shows nothing" in said, "what is no VDI gets a message, beside the other one's")
+check("no VDI in this data set" in said and "shows nothing" in said,
+      "a picture without a VDI gets a message, beside the empty VDI's")
 boxes = pvtest.text_boxes(view)
-check(len(boxes) == 2 and (boxes[0][0] > boxes[1][1] or boxes[1][0] > boxes[0][1]), "and they don't overlap")
+check(len(boxes) == 2 and (boxes[0][0] > boxes[1][1] or boxes[1][0] > boxes[0][1]), "the two messages don't overlap")
 look(view, "no_vdi")
 simple.Hide(empty, view)
 simple.Hide(picture, view)
-check(not pvtest.message_in(view), "what is hidden says nothing")
+check(not pvtest.message_in(view), "hidden data have no messages")
 
 # Viewpoints.
 scene.AnimationTime = reader.TimestepValues[0]
@@ -120,31 +123,34 @@ for scale in (None, 1):
     for position in ([2.2, 1.9, 2.4], [-1.2, -0.9, -1.4], [0.5, 0.5, 3], [3, 0.5, 0.5]):
         check(said_from(position, scale=scale) == "", "nothing is said from {}{}".format(position, kind))
     check(OUT in said_from([2.2, 1.9, 2.4], AWAY, scale), "a view that looks away says so" + kind)
-    check(OUT in said_from([2.2, 9, 2.4], [0.5, 9, 0.5], scale), "and one that looks past the VDI" + kind)
-    check(said_from([2.2, 1.9, 2.4], scale=scale) == "", "and nothing when it looks there again" + kind)
+    check(OUT in said_from([2.2, 9, 2.4], [0.5, 9, 0.5], scale), "a view that looks past the VDI says so" + kind)
+    check(said_from([2.2, 1.9, 2.4], scale=scale) == "", "a view that looks at the VDI again has no message" + kind)
     check(said_from([0.7, 0.5, 0.4], scale=scale) == "From inside, this VDI is rough: press Reset Camera.",
           "a view from inside says so" + kind)
     low, high = pvtest.text_boxes(view)[0]
-    check(0.75 * SIZE[1] < low < high < SIZE[1], "at its upper edge, in rows {:g} to {:g}{}".format(low, high, kind))
-check(SMALL in said_from([2000, 2000, 2000]), "and one from too far away")
-check(SMALL in said_from([3, 3, 3], scale=1000), "and one of a wide parallel scale")
-check(OUT in said_from([2.2, 1.9, 2.4], AWAY, render=lambda _: view.SMProxy.InteractiveRender()), "interactive frames say it")
-check(look(view, "away").std() < 1, "pictures that are taken don't")
+    check(0.75 * SIZE[1] < low < high < SIZE[1],
+          "the message is at the view's upper edge, in rows {:g} to {:g}{}".format(low, high, kind))
+check(SMALL in said_from([2000, 2000, 2000]), "a view from too far away says so")
+check(SMALL in said_from([3, 3, 3], scale=1000), "a view of a wide parallel scale says so")
+check(OUT in said_from([2.2, 1.9, 2.4], AWAY, render=lambda _: view.SMProxy.InteractiveRender()),
+      "interactive frames say that the VDI is out of sight")
+check(look(view, "away").std() < 1, "screenshots don't say that the VDI is out of sight")
 ball = simple.Sphere(Center=AWAY)
 simple.Show(ball, view)
 check(said_from([2.2, 1.9, 2.4], AWAY) == "", "nothing is said where another object is seen")
 ball.Center, ball.Radius = [1.35, 1.2, 1.45], 0.6
-check(said_from([2.2, 1.9, 2.4]) == "", "or hides the VDI")
+check(said_from([2.2, 1.9, 2.4]) == "", "nothing is said where another object hides the VDI")
 behind = look(view, "behind")
 simple.Hide(reader, view)
-check((look(view, "nothing_behind") == behind).all(), "which it does")
+check((look(view, "nothing_behind") == behind).all(), "the object does hide the VDI")
 simple.Show(reader, view)
-check(OUT in said_from([2.2, 1.9, 2.4], AWAY), "and it is where that isn't seen either")
+check(OUT in said_from([2.2, 1.9, 2.4], AWAY), "there is a message where neither the VDI nor the object is seen")
 simple.Delete(ball)
 plane = simple.Plane()
 simple.Show(plane, view)
-check(OUT in said_from([2.2, 1.9, 2.4], AWAY), "of a flat object likewise")
-check(said_from([0, 0, -3], [0, 0, -1]) == "" and said_from([-0.4, -0.4, -0.5], [-0.5, -0.5, 0]) == "", "which may be seen")
+check(OUT in said_from([2.2, 1.9, 2.4], AWAY), "there is a message where neither the VDI nor a flat object is seen")
+check(said_from([0, 0, -3], [0, 0, -1]) == "" and said_from([-0.4, -0.4, -0.5], [-0.5, -0.5, 0]) == "",
+      "nothing is said where the flat object is seen")
 simple.Delete(plane)
 picture.PictureOnly = 0
 picture.CameraPosition, picture.CameraFocalPoint = [40, 30, 50], [0, 0, 0]
@@ -154,16 +160,17 @@ check(said_from([2.2, 1.9, 2.4]) == "From inside, this VDI is rough: press Regen
 check(said_from([2, -1, 20], [40, -1, 20]).count("VDI") == 1, "what is to be said of two VDIs is said once")
 display = simple.GetDisplayProperties(reader, view)
 display.Opacity = 0
-check(said_from([2, -1, 20], [40, -1, 20]).count("VDI") == 1, "and of one, where the other one is transparent")
+check(said_from([2, -1, 20], [40, -1, 20]).count("VDI") == 1,
+      "where one of two VDIs is transparent, the other one's message is said once")
 display.Opacity = 1
-check(said_from([40, 30, 50], [0, 0, 0]) == "", "and not where one of them is seen")
+check(said_from([40, 30, 50], [0, 0, 0]) == "", "nothing is said where one of two VDIs is seen")
 picture.CameraPosition, picture.CameraFocalPoint = [2.2, 1.9, 2.4], [0.5, 0.5, 0.5]
 check(said_from([2.2, 1.9, 2.4]) == "", "a VDI that was made inside is true from there")
 picture.CameraPosition, picture.CameraFocalPoint, picture.CameraViewAngle = [0, 0, 60], [-6, 0, 0], 6
 simple.Hide(reader, view)
-check(said_from([0, 0, 60], [0, 0, 0]) == "", "a part of the scene is seen")
+check(said_from([0, 0, 60], [0, 0, 0]) == "", "nothing is said where a part of the scene is seen")
 view.CameraViewAngle = 6
-check(OUT in said_from([0, 0, 60], [6, 0, 0]), "and nothing is where the VDI lacks what is in sight")
+check(OUT in said_from([0, 0, 60], [6, 0, 0]), "there is a message where the VDI lacks the part of the scene in sight")
 comparative = simple.CreateView("ComparativeRenderView")
 simple.Show(reader, comparative)
 simple.Render(comparative)
@@ -172,7 +179,7 @@ simple.Render(comparative)
 views = vtkCollection()
 comparative.SMProxy.GetViews(views)
 said = [pvtest.message_in(views.GetItemAsObject(index)) for index in range(views.GetNumberOfItems())]
-check(len(said) > 1 and all(OUT in each for each in said), "each of comparative views says it")
+check(len(said) > 1 and all(OUT in each for each in said), "each of comparative views says that the VDI is out of sight")
 simple.Delete(comparative)
 simple.Hide(picture, view)
 view.CameraViewAngle = 30
@@ -186,9 +193,10 @@ for _ in range(3):
     check(look(other, "other").std() > 5, "a view that comes later shows the VDI")
     simple.Delete(other)
 simple.Show(reader, view)
-check(look(view, "again").std() > 5, "and the first one still does")
+check(look(view, "again").std() > 5, "the first view still shows the VDI after the others are closed")
 errors = []
 observer = vtkOutputWindow.GetInstance().AddObserver("ErrorEvent", lambda *_: errors.append(1))
-check(OUT in said_from([2.2, 1.9, 2.4], AWAY) and not errors, "what is said after that is drawn without an error")
+check(OUT in said_from([2.2, 1.9, 2.4], AWAY) and not errors,
+      "a message after other views have closed is drawn without an error")
 vtkOutputWindow.GetInstance().RemoveObserver(observer)
 pvtest.finish()

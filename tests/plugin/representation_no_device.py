@@ -14,5 +14,5 @@ for _ in range(3):
 path = os.path.join(pvtest.OUTPUT, "no_device.png")
 simple.SaveScreenshot(path, view, ImageResolution=[480, 360])
 check(pvtest.read_png(path).std() > 5, "the view shows a message")
-check("mesa-vulkan-drivers" in pvtest.message_in(view), "and it says what helps")
+check("mesa-vulkan-drivers" in pvtest.message_in(view), "the message names the package that helps")
 pvtest.finish()

@@ -49,7 +49,7 @@ if MODE == "compare":
     check("beside a volume" in pvtest.message_in(view), "beside a volume on several ranks there is a message")
     simple.Hide(source, view)
     simple.Render(view)
-    check(pvtest.message_in(view) == "", "and none without it")
+    check(pvtest.message_in(view) == "", "without the volume there is no message")
 
 files = [os.path.join(pvtest.OUTPUT, "ranks_{}.vdi".format(step)) for step in range(3)]
 if MODE == "write":

@@ -59,12 +59,12 @@ wavelet = simple.Wavelet(WholeExtent=[-8, 8, -8, 8, -8, 8])
 nothing = filter_of(simple.TrivialProducer(registrationName="gird"))
 check(errors_of(nothing), "rank %d: an input without data is an error" % rank)
 for attempt in ("second", "third"):
-    check(not errors_of(nothing), "rank %d: that isn't said a %s time" % (rank, attempt))
+    check(not errors_of(nothing), "rank %d: an input without data isn't reported a %s time" % (rank, attempt))
 image = filter_of(wavelet, "RTDate")
 check("no array 'RTDate'" in errors_of(image), "rank %d: a missing array is an error" % rank)
-check(not errors_of(image), "rank %d: that isn't said twice" % rank)
+check(not errors_of(image), "rank %d: a missing array isn't reported twice" % rank)
 image.SelectInputScalars = ["POINTS", "RTData"]
-check(not errors_of(image), "rank %d: mended, it works" % rank)
+check(not errors_of(image), "rank %d: with an array that exists, the filter works" % rank)
 
 for name, values in (("FillGhosts", (0, 1)), ("PictureOnly", (0, 1)), ("Component", (0, -1)), ("Supersegments", (4, 5)),
                      ("SelectInputScalars", (["POINTS", "RTData"], ["CELLS", "RTData"])),
@@ -73,7 +73,7 @@ for name, values in (("FillGhosts", (0, 1)), ("PictureOnly", (0, 1)), ("Componen
     text = errors_of(image)
     check("different values" in text, "rank %d: %s that differs is an error" % (rank, name))
     setattr(image, name, values[0])
-    check(not errors_of(image), "rank %d: and equal again it works" % rank)
+    check(not errors_of(image), "rank %d: once %s is equal again, the filter works" % (rank, name))
 
 # Another component or array gets its range over all ranks, those without blocks included.
 vectors = filter_of(simple.ProgrammableSource(OutputDataSetType="vtkMultiblockDataSet", Script=VECTORS), "velocity")
@@ -82,13 +82,13 @@ vectors.Component = 2
 check(range_of(vectors.LookupTable) == [0, 3], "rank %d: a component has its range %s" % (rank, range_of(vectors.LookupTable)))
 vectors.SelectInputScalars = ["POINTS", "force"]
 check(range_of(vectors.LookupTable) == [0, 5] and vectors.Component == 2,
-      "rank %d: and so has that of another array %s" % (rank, range_of(vectors.LookupTable)))
-check(not errors_of(vectors), "rank %d: both are the same on all ranks" % rank)
+      "rank %d: another array's component has its range %s" % (rank, range_of(vectors.LookupTable)))
+check(not errors_of(vectors), "rank %d: component and array are the same on all ranks" % rank)
 
 # Rank 0 alone makes the output. It refuses an array's name that is too long for a file.
 NAME = "x" * 2 ** 20
 named = simple.Calculator(Input=wavelet, Function="RTData", ResultArrayName=NAME)
 check("bytes" in errors_of(filter_of(named, NAME, LookupTable=image.LookupTable)),
       "rank %d: an output that can't be made is an error" % rank)
-check(not errors_of(image), "rank %d: and another filter goes on" % rank)
+check(not errors_of(image), "rank %d: another filter goes on after that error" % rank)
 finish()

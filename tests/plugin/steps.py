@@ -176,16 +176,19 @@ check(all(not same(other_expected, picture) for picture in expected), "a file of
 read_ahead(11)
 os.replace(shutil.copy(other, os.path.join(FOLDER, "new.vdi")), files[11])
 view.ViewTime = times[11]
-check(same(screenshot(view, "replaced"), other_expected), "one that is replaced by another size and viewpoint, too")
+check(same(screenshot(view, "replaced"), other_expected),
+      "a file that is replaced by one of another size and viewpoint is read again")
 read_ahead(15)
 os.truncate(files[15], os.path.getsize(files[15]) // 2)
 view.ViewTime = times[15]
 lines = said_by(lambda: screenshot(view, "truncated"))
-check("what makes it has failed" in pvtest.message_in(view), "one that isn't whole any more isn't shown, and the view says so")
-check(lines.count("invalid .vdi file") == 1, "and one line says why")
+check("what makes it has failed" in pvtest.message_in(view),
+      "a file that isn't whole any more isn't shown, and the view says so")
+check(lines.count("invalid .vdi file") == 1, "one line says why the file that isn't whole isn't shown")
 shutil.copy(kinds[15 % KINDS], files[15])
 simple.ReloadFiles(reader)
-check(same(screenshot(view, "whole"), expected[15 % KINDS]) and not pvtest.message_in(view), "until it is whole and read again")
+check(same(screenshot(view, "whole"), expected[15 % KINDS]) and not pvtest.message_in(view),
+      "a file that is whole again is shown once it is read again")
 
 # By mouse: a step requests a still frame, which must not hold up a user who is moving the camera.
 interactor = vtkGenericRenderWindowInteractor()

@@ -53,7 +53,7 @@ for number, supersegments in enumerate((12, 5)):
     if link is None:
         with open(link_file) as file:
             link = file.read().strip()
-        check(stat.S_IMODE(os.stat(link_file).st_mode) == 0o600, "its owner alone can read the link")
+        check(stat.S_IMODE(os.stat(link_file).st_mode) == 0o600, "only the owner of the link's file can read it")
         check("#token=" in link and link.startswith("http://127.0.0.1:"), "the link has host, port and token")
     with open(os.path.join(OUTPUT, "stream_%s.vdi" % name), "rb") as file:
         check(arrives(link, file.read()), "a viewer gets VDI %d as the extractor of files writes it" % number)
@@ -63,4 +63,4 @@ del extractor
 gc.collect()
 check(not os.path.exists(link_file), "the link goes with the server")
 done = receive(link, 0.5)
-check(done.returncode == 1 and "no connection" in done.stderr, "and the server with the extractor")
+check(done.returncode == 1 and "no connection" in done.stderr, "the server goes with the extractor")

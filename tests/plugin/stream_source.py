@@ -184,7 +184,7 @@ def two(live, source):
     second.URL = live.link
     check(step_of(second) == 4 and information(second, "Arrivals") > seen, "another URL brings that server's VDI")
     simple.Delete(second)
-    check(step_of(source) == 4, "and one outlives the other")
+    check(step_of(source) == 4, "the first source outlives the second")
     other.kill()
 
 
@@ -194,10 +194,10 @@ def nothing_yet():
     source = simple.VDIStream(URL=empty.link, Patience=0.5)
     text = said(lambda: screenshot(source))
     check(text == "", "a source that waits is no error: " + text)
-    check("There is no VDI to show yet" in message_in(view), "the view says that there is none yet: " + message_in(view))
+    check("There is no VDI to show yet" in message_in(view), "the view says that there is no VDI yet: " + message_in(view))
     empty.appear(1)
     take_next(source, 0)
-    check(step_of(source) == 1, "and has the first one")
+    check(step_of(source) == 1, "a source that has waited has the first VDI")
     simple.Delete(source)
     empty.kill()
 
@@ -213,12 +213,12 @@ def wrong_token(live):
 
     text = said(use)
     line = information(source, "Connection")
-    check("the token is wrong" in line and "\n" not in line, "a wrong token is one line: " + line)
-    check(text.count("the token is wrong") == 1, "and is said once: " + text)
-    check("the token is wrong" in message_in(view), "and in the view: " + message_in(view))
-    check(wrong not in text + line + message_in(view), "without the token")
+    check("the token is wrong" in line and "\n" not in line, "a wrong token makes one line: " + line)
+    check(text.count("the token is wrong") == 1, "a wrong token is said once: " + text)
+    check("the token is wrong" in message_in(view), "the view says that the token is wrong: " + message_in(view))
+    check(wrong not in text + line + message_in(view), "no message contains the wrong token")
     source.URL = live.link
-    check(step_of(source) == 4, "the right link mends that")
+    check(step_of(source) == 4, "the right link mends a wrong token")
     simple.Delete(source)
 
 
@@ -243,17 +243,17 @@ def saved_without_token(live, source):
         with open(path, encoding="utf-8") as file:
             texts[name] = file.read()
     for name, text in texts.items():
-        check(live.address in text, "there's the URL in the " + name)
-        check(TOKEN not in text, "and no token")
+        check(live.address in text, "the URL is in the " + name)
+        check(TOKEN not in text, "the token isn't in the " + name)
 
     simple.ResetSession()
     simple.LoadState(files["pvsm"])
     loaded, = simple.GetSources().values()
     text = said(loaded.UpdatePipeline)
     check("there is no token" in information(loaded, "Connection") and text.count("there is no token") == 1,
-          "a loaded state says that it needs one, once: " + text)
+          "a loaded state says once that it needs a token: " + text)
     loaded.URL = live.link
-    check(step_of(loaded) == 4, "and gets it by the link")
+    check(step_of(loaded) == 4, "a loaded state gets its token by the link")
     return loaded
 
 

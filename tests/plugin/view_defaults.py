@@ -44,7 +44,7 @@ unplaced = simple.CreateView("RenderView")
 other = simple.VolumetricDepthImage(Input=simple.Wavelet())
 other.Resolution = [32, 24]
 other.UpdatePipeline()
-check(list(other.CameraPosition) == [0, 0, 0], "nor from a view whose camera nobody has placed")
+check(list(other.CameraPosition) == [0, 0, 0], "no camera is taken from a view whose camera nobody has placed")
 explicit = simple.VolumetricDepthImage(Input=simple.Wavelet(WholeExtent=[-8, 8, -8, 8, -8, 8]), Resolution=[32, 24],
                                        ScalarOpacityUnitDistance=np.sqrt(3))
 check(np.abs(picture(explicit).astype(int) - picture(simple.VolumetricDepthImage(
@@ -59,15 +59,15 @@ check(list(image.SelectInputScalars) == ["POINTS", "twice"], "a new filter has t
 image.UpdatePipeline()
 check(taken(image)[:2] == [POSITION, [1, 0, -1]] and image.CameraViewAngle == 25
       and np.allclose(image.CameraViewUp, view.GetActiveCamera().GetViewUp()), "the first update takes the view's camera")
-check(list(image.Resolution) == SIZE, "its size")
-check(image.ScalarOpacityUnitDistance == 2.5, "the volume's unit distance")
-check(image.LookupTable == representation.LookupTable, "and its colour map")
+check(list(image.Resolution) == SIZE, "the first update takes the view's size")
+check(image.ScalarOpacityUnitDistance == 2.5, "the first update takes the volume's unit distance")
+check(image.LookupTable == representation.LookupTable, "the first update takes the volume's colour map")
 view.CameraPosition = [50, 0, 0]
 image.UpdatePipeline()
-check(list(image.CameraPosition) == POSITION, "the second takes nothing")
+check(list(image.CameraPosition) == POSITION, "the second update takes nothing")
 simple.Hide(source, view)
 first, values = picture(image), taken(image)
-check(first.max() > 60 and first.std() > 10, "it shows something")
+check(first.max() > 60 and first.std() > 10, "the filter shows something")
 write_png("view_defaults.png", first)
 trace = smtrace.stop_trace()
 
@@ -102,8 +102,8 @@ for what, load in (("trace", lambda: exec(trace, {})), ("state", lambda: simple.
     again = simple.FindSource("vdi")
     check(again is not None, "a %s makes the filter again" % what)
     different = [a for a, b in zip(taken(again), values) if a != b]
-    check(not different, "with the same values %s" % different)
-    check(np.abs(picture(again).astype(int) - first).max() <= 1, "and the same picture")
+    check(not different, "the filter of the %s has the same values; different: %s" % (what, different))
+    check(np.abs(picture(again).astype(int) - first).max() <= 1, "the filter of the %s has the same picture" % what)
 
 
 def percent_of(proxy):
@@ -123,15 +123,15 @@ check(np.abs(picture(again).astype(int) - first).max() <= 1, "while it is held, 
 again.SMProxy.InvokeCommand("Prepare")
 while 0 <= percent_of(again) < 100:
     pass
-check(percent_of(again) == 100, "what is prepared gets there")
-check(np.abs(picture(again).astype(int) - first).max() <= 1, "and waits for the release")
+check(percent_of(again) == 100, "the preparation gets to its end")
+check(np.abs(picture(again).astype(int) - first).max() <= 1, "the prepared VDI waits for the release")
 again.SMProxy.InvokeCommand("Release")
 again.SMProxy.MarkDirty(again.SMProxy)
-check(picture(again).max() == 0, "which takes it")
+check(picture(again).max() == 0, "the release takes the prepared VDI")
 simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 1, 0.5, 0]
-check(picture(again).max() > 60, "after it edits count at once again")
+check(picture(again).max() > 60, "after the release, edits count at once again")
 again.SMProxy.InvokeCommand("Prepare")
-check(percent_of(again) == -1, "what is there already isn't prepared")
+check(percent_of(again) == -1, "a VDI that is there already isn't prepared")
 
 # A file gets the VDI of the current properties and maps, not the one that the window shows.
 again.SMProxy.InvokeCommand("Hold")
@@ -155,11 +155,11 @@ again.SMProxy.InvokeCommand("Release")
 again.Supersegments, again.Resolution, again.SamplingRate = 40, [1200, 900], 4
 simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 0.4, 0.5, 0]
 again.SMProxy.InvokeCommand("Prepare")
-check(0 <= percent_of(again) < 100, "a large one takes a while")
+check(0 <= percent_of(again) < 100, "a large VDI takes a while to prepare")
 again.SMProxy.InvokeCommand("Hold")
 while 0 <= percent_of(again) < 100:
     pass
-check(percent_of(again) == -1, "it ends once another edit holds the filter")
+check(percent_of(again) == -1, "a preparation ends once another edit holds the filter")
 again.SMProxy.InvokeCommand("Release")
 again.Supersegments, again.Resolution, again.SamplingRate = 25, SIZE, 0
 picture(again)

@@ -93,7 +93,7 @@ def one_after_another(server):
     print("%d connections in %.1f s: %.1f MiB, %d threads, %d files before; %.1f, %d, %d after" %
           (count, seconds, *before, *after))
     check(after[0] - before[0] < 16, "connections leave no memory behind")
-    check(after[1] == before[1] and after[2] <= before[2], "no threads and no files")
+    check(after[1] == before[1] and after[2] <= before[2], "connections leave no threads and no files behind")
 
 
 def at_once(server):
@@ -118,7 +118,7 @@ def at_once(server):
         thread.join(PATIENCE)
     print("100 at once: %d are shown a frame, %d are refused; %.1f MiB" % (len(frames), len(codes), standing(server)[0]))
     check(len(frames) == 64 and codes == [4503] * 36, "64 of 100 viewers are let in, the others are told why not")
-    check(len(set(frames)) == 1, "and all see the same")
+    check(len(set(frames)) == 1, "all viewers that are let in see the same")
 
 
 def slowly(server):
@@ -159,15 +159,15 @@ def slowly(server):
             selector.unregister(key.fileobj)
     print("400 slow ones: %d lost, the last after %.1f s; meanwhile %d viewers were shown a frame, within %.2f s; %.1f MiB" %
           (len(lost), max(lost.values(), default=0), answered, longest, standing(server)[0]))
-    check(len(lost) == 400 and max(lost.values()) < 20, "slow ones are cut off")
-    check(answered > 10 and longest < 5, "and keep nobody out")
+    check(len(lost) == 400 and max(lost.values()) < 20, "slow connections are cut off")
+    check(answered > 10 and longest < 5, "slow connections keep no viewer out")
     seen.send(type="pause")
     check(server.viewers() == 1, "the viewer who was there before stays")
     seen.close()
     for connection in slow:
         connection.close()
     until(lambda: standing(server)[2] <= before[2], "closed connections")
-    check(standing(server)[0] - before[0] < 16, "they leave no memory behind")
+    check(standing(server)[0] - before[0] < 16, "slow connections leave no memory behind")
 
 
 def frames(server, file, live):
@@ -188,11 +188,11 @@ def frames(server, file, live):
     after = standing(server)
     print("%d frames: %.1f MiB, %d threads, %d files before; %.1f, %d, %d after" % (frame_count, *before, *after))
     check(after[0] - before[0] < 4 + frame_count / 1000, "frames leave no memory behind")
-    check(after[1:] == before[1:], "no threads and no files")
+    check(after[1:] == before[1:], "frames leave no threads and no files behind")
     for announced, got in stalled.levels():
         if announced["frame"] == frame_count + 199:
             break
-    check(got == data, "who stalled has the newest one in the end")
+    check(got == data, "a viewer that stalled has the newest frame in the end")
 
 
 with tempfile.TemporaryDirectory() as folder:
@@ -204,7 +204,7 @@ with tempfile.TemporaryDirectory() as folder:
         at_once(running)
         slowly(running)
         check(running.end() == 0, "the server ends in order")
-        check(running.said() == "", "and had nothing to complain about")
+        check(running.said() == "", "the server had nothing to complain about")
     finally:
         running.close()
     appearing = pathlib.Path(folder) / "live"
@@ -213,7 +213,7 @@ with tempfile.TemporaryDirectory() as folder:
     try:
         frames(running, made, appearing)
         check(running.end() == 0, "the server ends in order")
-        check(running.said() == "", "and had nothing to complain about")
+        check(running.said() == "", "the server had nothing to complain about")
     finally:
         running.close()
 sys.exit(1 if failures else 0)

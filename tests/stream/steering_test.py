@@ -138,7 +138,7 @@ def in_files(folder, at, paused_at):
     check("120 x 60" in after and "(60, 20, 30)" in after and "at most 7 " in after and "from 0.25 to 0.75" in after, after)
     check("120 x 60" in files[paused_at] and "64 x 48" in files[paused_at + 1], files[paused_at + 1])
     steps = sorted(files)
-    check(steps[-1] % 4 == 0 and steps[-1] - steps[-2] == 4, "the last ones are every fourth step's: %s" % steps[-5:])
+    check(steps[-1] % 4 == 0 and steps[-1] - steps[-2] == 4, "the last files are every fourth step's: %s" % steps[-5:])
     frames = [json.loads(line) for line in lines(folder / "run.jsonl")]
     logged = [frame["step"] for frame in frames if frame["event"] == "frame" and frame["files"]]
     check(logged == steps, "the run's log has the files")
@@ -155,14 +155,16 @@ def told(folder, driver, paused_at, camera):
     given = {int(step): (float(value), int(waves)) for step, value, waves in (line.split() for line in parameters[0])}
     at = log[0]["step"]
     check(given[at] == (0.5, 3) and given[at + 1] == (0.8125, 5), "parameters change after the step that the log names")
-    check(given[paused_at][0] == 0.8125 and given[paused_at + 1][0] == 0.125, "what changes meanwhile is in force then")
+    check(given[paused_at][0] == 0.8125 and given[paused_at + 1][0] == 0.125,
+          "a parameter that changes while the simulation waits is in force after that step")
     if script == "json":
         in_files(folder, at, paused_at)
         return
     views = [[json.loads(line) for line in lines(folder / ("view_%d.txt" % rank))] for rank in range(RANKS)]
     check(all(one == views[0] for one in views), "all ranks have the same properties at the same steps")
     seen = {view["step"]: view for view in views[0]}
-    check(seen[at]["position"] == [18.0, 20.0, 60.0] and seen[at]["supersegments"] == 25, "and so does the view")
+    check(seen[at]["position"] == [18.0, 20.0, 60.0] and seen[at]["supersegments"] == 25,
+          "the view changes after the step that the log names")
     after = seen[at + 1]
     check(after["position"] == camera["position"] and after["angle"] == 25.0 and after["supersegments"] == 7, after)
     check(after["resolution"] == [120, 60] and after["colours"] == after["opacities"] == [0.25, 0.75], after)

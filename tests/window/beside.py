@@ -120,13 +120,14 @@ def films(window):
         film, single = path("film.%04d.png" % step), path("step_%d.png" % step)
         check(ssim(film, single) > 0.9999, "Save Animation has step %d" % step)
         if step > 0:
-            check(ssim(film, path("step_%d.png" % (step - 1))) < 0.99, "which differs from the one before")
+            check(ssim(film, path("step_%d.png" % (step - 1))) < 0.99,
+                  "step %d of the animation differs from the one before" % step)
     inside("note_frames()")
     window.click("Play")
     wait_for("end of the animation", lambda: made("temperature", 3.0) and not inside("is_played()"), 60)
     frames = inside("noted")
     check(len(frames) >= 4 and {shown for shown, _ in frames} == {0.0, 1.0, 2.0, 3.0}, "an animation is played")
-    check(all(shown == of for shown, of in frames), "and shows each step's VDI at its time: %s" % frames)
+    check(all(shown == of for shown, of in frames), "an animation shows each step's VDI at its time: %s" % frames)
 
 
 def delete_while_made(window):

@@ -53,5 +53,5 @@ row, column = np.unravel_index(squares.argmin(), squares.shape)
 there = screen[row:row + view.shape[0], column:column + view.shape[1]]
 difference = np.abs(there - view).mean()
 print("the window shows that picture at {}, {}: mean difference {:.3f} of 255".format(column, row, difference))
-check(difference < 1, "the window shows that picture")
+check(difference < 1, "the window shows the view's picture")
 pvtest.finish()

@@ -58,7 +58,7 @@ def regenerate_before_apply(window):
     width = window.view()[2]
     check(any(value.isdigit() and abs(int(value) - width) < 8 for value in values),
           "Regenerate From This View before the first Apply takes the view's size")
-    check(window.is_enabled("Apply"), "and leaves the VDI to Apply")
+    check(window.is_enabled("Apply"), "Regenerate From This View before the first Apply leaves the VDI to Apply")
     window.screenshot("3_regenerated.png")
     window.click("Undo Regenerate VDI")
     wait_for("panel as it was", lambda: window.values() == unset)
@@ -147,7 +147,7 @@ def first_session(window):
     window.key("Escape", "Escape")
     window.menu("Filters", "Volumetric Depth Images", "Volumetric Depth Image")
     window.screenshot("3_filter.png")
-    check(" s" not in estimates(window, "Estimate for an average volume: "), "no time is invented")
+    check(" s" not in estimates(window, "Estimate for an average volume: "), "the estimate for an average volume has no time")
     regenerate_in_2d(window)
     regenerate_before_apply(window)
     window.apply()
@@ -155,7 +155,7 @@ def first_session(window):
     window.screenshot("4_applied.png")
     check_like_volume(volume, middle_of_view(window, "vdi_middle.png"))
     values = window.values()
-    check(estimates(window, "Estimate from the last VDI: ").endswith(" s"), "and then the last VDI's is scaled")
+    check(estimates(window, "Estimate from the last VDI: ").endswith(" s"), "the estimate from the last VDI has a time")
     check(any(value.startswith("1.73205") for value in values), "the unit distance is the volume's")
     check(any(value.isdigit() and abs(int(value) - width) < 8 for value in values), "the width is the view's")
 
@@ -165,7 +165,7 @@ def first_session(window):
     window.apply()
     time.sleep(1)
     window.screenshot("4_applied_again.png")
-    check(window.values() == values, "and another one takes the same")
+    check(window.values() == values, "another Apply takes the same values")
 
     window.enter("Sampling Rate", 4)  # so that it takes a while
     window.apply()

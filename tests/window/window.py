@@ -584,7 +584,7 @@ class Window:
         xdotool("windowactivate", "--sync", self.window, "key", "alt+F4")
         code = self.process.wait(seconds)
         check(code == 0, "ParaView's window is closed: exit code %s" % code)
-        check("nullptr" not in self.log_text(), "and Qt has nothing to say against it")
+        check("nullptr" not in self.log_text(), "the log has no message of Qt about a nullptr")
 
     def pixels(self):
         """The middle of the view, as bytes of red, green and blue."""
