@@ -117,8 +117,8 @@ void addCompare(CLI::App& app, Job& job) {
       app.add_subcommand("compare", "Measure the similarity of two PNGs: SSIM, PSNR, mean and largest error");
   command->footer(
       "The object's SSIM covers the part of the picture where either PNG differs from its background. The\n"
-      "background is the most frequent colour along the edge. In JSON, null stands for the infinite PSNR of\n"
-      "equal pictures.");
+      "background is the most frequent colour along the edge. In JSON, the infinite PSNR of equal\n"
+      "pictures is null.");
   const auto options = std::make_shared<CompareOptions>();
   command->add_option("a", options->a, "PNG")->type_name("")->required();
   command->add_option("b", options->b, "PNG")->type_name("")->required();

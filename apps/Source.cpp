@@ -30,7 +30,7 @@ glm::vec<3, T> vectorOf(const std::vector<T>& v) {
   return {v[0], v[1], v[2]};
 }
 
-/// The value that stands for a field's 1: near the greatest value of an integer type, 1 for
+/// The value that represents a field's 1: near the greatest value of an integer type, 1 for
 /// floating point.
 double topOf(ScalarType type) {
   switch (type) {

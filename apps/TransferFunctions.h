@@ -8,7 +8,7 @@
 
 namespace vdi::apps {
 
-/// Reads the file that docs/raw-volumes.md describes. With "relative": true, x of 0 and 1 stand for
+/// Reads the file that docs/raw-volumes.md describes. With "relative": true, x of 0 and 1 are
 /// the ends of `range`, as in config::stretched. Throws Error: Io if the file cannot be read,
 /// Format if it is not a transfer function.
 TransferFunction readTransferFunction(const std::filesystem::path& path, const ScalarRange& range);

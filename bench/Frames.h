@@ -112,8 +112,8 @@ std::string stageLines(const FrameFigures& figures);
 /// Adds a VDI's settings to a row.
 void addSettings(nlohmann::json& row, const GenerateSettings& settings);
 
-/// Adds the figures to a row. null stands for a figure that wasn't measured, or for a stage that
-/// one rank lacks.
+/// Adds the figures to a row. A figure that wasn't measured is null, and so is a stage that one
+/// rank lacks.
 void addFigures(nlohmann::json& row, const FrameFigures& figures);
 
 }  // namespace vdi::bench

@@ -64,7 +64,7 @@ struct BenchRow {
 
 std::string tableHead();
 std::string tableLine(const BenchRow& row);
-/// null stands for a figure that wasn't measured or is infinite.
+/// A figure that wasn't measured or is infinite is null.
 nlohmann::json toJson(const BenchRow& row);
 
 }  // namespace vdi::bench

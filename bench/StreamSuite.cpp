@@ -257,7 +257,7 @@ class StreamSuite {
  private:
   /// A viewer's figures for one level.
   struct LevelFigures {
-    int factor = 1;  // one list in so many of each row and column
+    int factor = 1;  // the level keeps every factor-th list of each row and column
     double mebibytes = 0.0;
     double ssim = 0.0;
   };

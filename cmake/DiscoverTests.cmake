@@ -12,7 +12,7 @@ execute_process(
 if(NOT cases)
   message(FATAL_ERROR "${PROGRAM} lists no tests")
 endif()
-set(semicolon "<semicolon>") # stands for one in a name, because others separate names
+set(semicolon "<semicolon>") # replaces a semicolon in a name, because others separate names
 string(REPLACE ";" "${semicolon}" cases "${cases}")
 string(REPLACE "\n" ";" cases "${cases}")
 

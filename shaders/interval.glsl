@@ -18,7 +18,7 @@ struct ListProgress {
   float before;         // transmittance of all intervals so far
   float reach;          // end of the last one
   float stepsPerDepth;  // 1 / length of a sample
-  uint samplesAtOnce;   // samples that an interval stands for
+  uint samplesAtOnce;   // samples that an interval represents
   uint visible;         // visible samples
   uint runs;            // a run ends at a gap, which is a part of the ray without intervals
   bool inRun;           // whether the next visible interval belongs to a run, if no gap precedes it

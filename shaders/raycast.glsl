@@ -71,7 +71,7 @@ uvec2 samplesIn(vec3 lo, vec3 hi) {
 }
 
 // The bounds of the visible part, the scene's or a region's, seldom lie half-way between two samples. The
-// outermost samples stand for what is really there: the first one's interval starts where the ray enters, the
+// outermost samples represent what is really there: the first one's interval starts where the ray enters, the
 // last one's ends where it leaves. This depends on the ray, the scene and the region alone, so it is the same
 // on every rank. Without it, the faces of a filled box show the sample lattice as stripes.
 // If a ray leaves the bounds before it reaches the middle of any sample, the part between is one sample, and
@@ -190,7 +190,7 @@ layout(constant_id = 3) const uint samplesAhead = 1;
 // Number of samples used as one: more than 1 while pre-segments are counted (CastParams::countedSamples).
 uint samplesAtOnce;
 
-// The interval that samples `first` to `last` stand for.
+// The interval of samples `first` to `last`.
 vec2 spanOf(uint first, uint last) {
   return vec2(frontOf(first), backOf(min(last + samplesAtOnce, rayScene.y) - 1u));
 }

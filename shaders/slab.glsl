@@ -1,4 +1,4 @@
-// The material of a slab, the part of a ray that a sample stands for, by one fetch from the table of slabs.
+// The material of a slab, the part of a ray that a sample represents, by one fetch from the table of slabs.
 // Twin of vdi/core/SlabTable.cpp, whose header describes the layout.
 //
 // A part of raycast.glsl. The program provides params and slabs.

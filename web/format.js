@@ -57,7 +57,7 @@ export class FormatError extends Error {}
  * @typedef {object} Lists
  * @property {Uint32Array} offsets width * height + 1
  * @property {Uint32Array} words
- * @property {{first: number, step: number}} code code c stands for depth first + c * step; compact
+ * @property {{first: number, step: number}} code code c means depth first + c * step; compact
  *     only
  */
 /** @typedef {Header & Lists} Vdi */
@@ -281,7 +281,7 @@ function unfold(folded) {
 /**
  * Walks the lists of a chunk and calls `restore(index, reference, previous)` for each supersegment.
  * `reference` is the supersegment that predicts it, `previous` the one before it in its list; -1
- * stands for none.
+ * means none.
  * @param {Chunk} chunk
  * @param {Uint8Array} plain
  * @param {number} lengthsAt place of the lists' lengths in `plain`

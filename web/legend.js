@@ -5,7 +5,7 @@
 const MOST_DECIMALS = 15;  // doubles have no more digits
 
 /**
- * A value with so many digits that it differs from its neighbours in a narrow range, too.
+ * The value with enough digits to differ from its neighbours, in a narrow range, too.
  * @param {number} value
  * @param {number} span distance between the least and the greatest value
  */

@@ -12,7 +12,7 @@ import {dot} from "./vector.js";
  * @typedef {object} Leaning
  * @property {Uint32Array} slopes a word for each supersegment: slopes of front x, front y, back x and
  *   back y, a signed byte each, in units of slopeUnit
- * @property {number} slopeUnit depth per list that a slope of 1 stands for
+ * @property {number} slopeUnit depth per list at a slope of 1
  * @property {number[][]} faces of the VDI's box in V_O's view space: x, y, z and w of each
  * @property {Uint32Array} heads as in Heads, with the reach of leaning faces
  * @property {Uint32Array} tiles

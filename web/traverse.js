@@ -188,7 +188,7 @@ vec2 metDepths(Words words) {
 
 #if SHEARED
 uniform usampler2DArray slopes;
-uniform float slopeUnit;    // depth per list that a slope of 1 stands for, in codes or depths
+uniform float slopeUnit;    // depth per list at a slope of 1, in codes or depths
 uniform vec4 boxFaces[6];   // the box is where dot(xyz, p) >= w, in V_O's view space
 
 // Slopes of front and back, along x and y each.

@@ -19,9 +19,9 @@ struct Leaf {
   std::int64_t count = 0;
   std::int64_t stride = 0;  // in bytes
 
-  /// 0 <= index < count.
+  /// Value number `index`, 0 <= index < count.
   double at(std::int64_t index) const;
-  /// The same for integers.
+  /// Value number `index` as an integer, 0 <= index < count.
   std::int64_t wholeAt(std::int64_t index) const;
 };
 

@@ -103,7 +103,7 @@ Job::Job(const std::string& program, const std::vector<std::string>& command) {
   for (char** variable = environ; variable != nullptr && *variable != nullptr; ++variable) {
     if (!isOfMpiJob(*variable)) environment.emplace_back(*variable);
   }
-  // The same as mpirun --quiet, an option that Open MPI 5 lacks.
+  // These variables have the effect of mpirun --quiet, an option that Open MPI 5 lacks.
   environment.emplace_back("OMPI_MCA_orte_execute_quiet=1");
   environment.emplace_back("PRTE_MCA_prte_execute_quiet=1");
 

@@ -95,7 +95,7 @@ struct CastParams {
   // first row to the row after the band, as [rows][countedWidth].
   uint countedStride;
   uint countedWidth;
-  uint countedSamples;  // one sample, at a multiple of this number, stands for that many
+  uint countedSamples;  // one sample, at a multiple of this number, counts for that many
   uint maxPerList;
   float level;      // in the histogram; negative: equal budgets
   uint levelShift;  // for levels

@@ -157,7 +157,7 @@ struct RenderParams {
   float farthest;
   float pixelSize;  // of V_O: view-space size of a pixel at depth 1 (perspective) or anywhere (parallel)
   uint parallel;    // projection of V_O
-  float slopeUnit;  // depth per list that a slope of 1 stands for
+  float slopeUnit;  // depth per list at a slope of 1
   uint width;       // of the picture
   uint height;
   ivec2 lists;  // of the VDI: width, height

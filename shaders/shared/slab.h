@@ -1,4 +1,4 @@
-// The table of slabs, the parts of a ray that one sample stands for (core/SlabTable.h, shaders/slab.glsl).
+// The table of slabs, the parts of a ray that one sample represents (core/SlabTable.h, shaders/slab.glsl).
 #ifndef VDI_SHARED_SLAB_H
 #define VDI_SHARED_SLAB_H
 #include "interop.h"

@@ -163,7 +163,7 @@ class FakeSocket {
 
 const soon = (milliseconds = 0) => new Promise((resolve) => setTimeout(resolve, milliseconds));
 
-/** A connection whose decoder takes a file's first byte for the VDI, and so many milliseconds. */
+/** A connection whose decoder takes `decodeMs` milliseconds, and a file's first byte for the VDI. */
 function connection(decodeMs = 5) {
   /** @type {FakeSocket[]} */
   const sockets = [];

@@ -177,7 +177,7 @@ CASES = {
     "bending opacity": (case_of(opacities=[(0, 0.02, 0.3, 0.4), (0.6, 0.5, 0.7, 0.2), (1, 0.1, 0.5, 0)]), []),
     "sharp opacity": (case_of(opacities=[(0, 0.02, 0.3, 0.8), (1, 0.5, 0.5, 0)]), []),
 }
-# The same with steps, which rays take between two samples.
+# Maps with steps, which rays take between two samples, and the channels that they lack.
 STEPS = {
     "Step": (case_of(points=SATURATED, ColorSpace="Step"), []),
     "colours beyond the range": (case_of(points=[(0.3, 0.1, 0.2, 0.9), (0.7, 0.9, 0.3, 0.1)], UseAboveRangeColor=1,

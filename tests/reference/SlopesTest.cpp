@@ -14,7 +14,7 @@ using reference::Slopes;
 using reference::SlopeUnit;
 
 constexpr glm::ivec2 size{5, 4};
-/// A slope of 1 stands for a depth of 8 / 127.
+/// A slope of 1 is a depth of 8 / 127 per list.
 constexpr SlopeUnit unit{1.0F, shared::renderMaxSlope / shared::renderSlopes};
 
 /// The nearest slope to a change of depth from list to list.

@@ -1,4 +1,4 @@
-"""`vdi serve --stdio` at the end of a command, and --from. `sh -c` stands for ssh. Argument: vdi."""
+"""`vdi serve --stdio` at the end of a command, and --from. `sh -c` takes the place of ssh. Argument: vdi."""
 import json
 import os
 import pathlib

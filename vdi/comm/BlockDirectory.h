@@ -35,15 +35,15 @@ struct BlockEntry {
   /// The box shifted by the block's offset, to the places of the values in it. If two boxes meet at a face,
   /// so do the shifted ones, provided that their blocks have the same offset and spacing.
   Box ofValues(const Box& box) const { return {box.lo + offset * spacing, box.hi + offset * spacing}; }
-  /// The volume that the stored values stand for, ghost layers included.
+  /// The volume that the stored values represent, ghost layers included.
   Box storedBox() const {
     const glm::dvec3 beyond = cells ? 0.5 * spacing : glm::dvec3(0.0);
     return {origin - beyond, origin + glm::dvec3(dims - 1) * spacing + beyond};
   }
 };
 
-/// Compares the volumes that a value of each block stands for. Volumes that differ by at most 1 % are of the
-/// same level.
+/// Compares the volumes that one value of each block represents. Volumes that differ by at most 1 % are of
+/// the same level.
 enum class Level { Finer, Same, Coarser };
 Level levelOf(const BlockEntry& block, const BlockEntry& comparedWith);
 

@@ -24,7 +24,7 @@ struct Gathered {
   }
 };
 
-/// Owns a duplicate of an MPI communicator, or stands for one rank without MPI. Movable, not copyable. Every
+/// Owns a duplicate of an MPI communicator, or represents one rank without MPI. Movable, not copyable. Every
 /// rank must call all functions marked collective in the same order, one thread at a time. MPI errors become
 /// Error{Communication}. If a rank lacks memory, the ranks agree on it before they communicate: a collective
 /// that throws on one rank throws on all. So must their callers, between collectives: whatever allocates
@@ -136,7 +136,7 @@ class Messages {
   Messages(Messages&&) = delete;
   Messages& operator=(Messages&&) = delete;
 
-  /// Takes the memory for one more message, sent or received, of so many bytes. Call it for each within
+  /// Takes the memory for one more message, sent or received, of `bytes` bytes. Call it for each within
   /// together(), before the first is sent: other ranks would wait for messages of a rank without memory.
   void reserve(std::uint64_t bytes);
   void send(int to, std::span<const std::byte> bytes);

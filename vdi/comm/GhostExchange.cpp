@@ -349,12 +349,12 @@ class LayerExchange {
     const Grid& grid = grids_[gridIndex];
     const bool keep = grid.wanted[wantedIndex].keep;
     const IndexBox values = grid.wanted[wantedIndex].box;
-    // The volume that the values stand for.
+    // The volume that the values represent.
     const Box volume{grid.block.origin + (glm::dvec3(values.lo) - 0.5) * grid.block.spacing,
                      grid.block.origin + (glm::dvec3(values.hi) - 0.5) * grid.block.spacing};
     // The owners of a place come first, the finest first; within a level, blocks with a value there precede
     // those that only close a gap. Owners claim the places of their values. Offsets leave places between
-    // levels that no values stand for; the owners of the space claim these. Blocks that only store a value
+    // levels that no values represent; the owners of the space claim these. Blocks that only store a value
     // come last, for places that nobody owns.
     enum class By { Values, Gap, Space };
     using Claim = std::tuple<bool, std::int32_t, By, std::size_t>;  // Space; level, negative; by; donor

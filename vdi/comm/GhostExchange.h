@@ -13,7 +13,7 @@ namespace vdi::comm {
 ///
 /// - Where blocks of different spacing overlap, the finest owns the common part. A block that finer ones
 ///   cover in part becomes several that share its data. A block that they cover completely is removed.
-/// - Blocks of one level (a value stands for the same volume, to 1 %) that overlap by more than 1e-3 of
+/// - Blocks of one level (a value represents the same volume, to 1 %) that overlap by more than 1e-3 of
 ///   a spacing on every axis are an Error{InvalidArgument} on all ranks that names both.
 /// - Faces that differ by less than 1e-3 of a spacing become one.
 ///
@@ -31,7 +31,7 @@ std::vector<Block> settleOwnership(const Communicator& comm, std::vector<Block> 
 /// Values. Neighbours are blocks of any rank whose owned boxes contain a value's place. The finest one
 /// determines the value, which is
 /// - a copy, if the neighbour has a value at the place, to within 1e-3 of a spacing;
-/// - for cell data, the mean over a finer neighbour's values in the volume that it stands for;
+/// - for cell data, the mean over a finer neighbour's values in the volume that it represents;
 /// - else interpolated trilinearly from the neighbour's values, after those around the neighbour's own box
 ///   have been found.
 /// Integers are rounded. Where no block owns a place, a neighbour's ghost value is used if that neighbour has

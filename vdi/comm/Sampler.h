@@ -32,8 +32,8 @@ class Sampler {
   /// Reads these values. Sums are of the values that the block had in this call.
   void gather() { values_.gather(*block_, indices_); }
 
-  /// The sum over the samples of one value. The mean over finite samples stands for those that are not
-  /// finite. Without any finite one, the sum is infinite if all samples but NaN are infinities of one sign,
+  /// The sum over the samples of one value. Samples that are not finite count as the mean of the finite
+  /// ones. Without any finite one, the sum is infinite if all samples but NaN are infinities of one sign,
   /// else NaN.
   double sum(const glm::ivec3& value) const;
 

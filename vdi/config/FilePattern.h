@@ -10,8 +10,8 @@
 namespace vdi::config {
 
 /// A file's name with the step's number in it, in the syntax of ParaView's extractors: "{timestep}", or
-/// "{timestep:06d}" for at least six digits. "{camera}" stands for a camera's name. Without it, the camera's
-/// name stands before the extension, after "_".
+/// "{timestep:06d}" for at least six digits. "{camera}" becomes the camera's name. Without it, the camera's
+/// name comes before the extension, after "_".
 class FilePattern {
  public:
   /// Throws std::invalid_argument with the reason if there isn't exactly one number, there are other braces,

@@ -142,7 +142,7 @@ std::vector<std::string> presetNames();
 /// Parses a run. Throws Error{Format} with the place of the first mistake. `name` is the document's.
 Run parseRun(std::string_view text, const std::string& name);
 
-/// The fields of each object in such a document, by the object's JSON pointer; "*" stands for an index.
+/// The fields of each object in such a document, by the object's JSON pointer; "*" matches any index.
 const std::map<std::string, std::vector<std::string>>& runFields();
 
 /// A run's text and its origin.

@@ -92,7 +92,7 @@ struct Block {
   }
   std::size_t byteCount() const { return valueCount() * sizeOf(type); }
   bool isPacked() const { return !strides && !computed; }
-  /// Moves the values by so many spacings, as staggered grids need. The owned box stays.
+  /// Moves the values, as staggered grids need, by a distance in spacings. The owned box stays.
   void moveValues(const glm::dvec3& spacings);
   /// Sets the strides of the values. Drops them if the values are packed and aligned.
   void setStrides(const ByteStrides& bytes);
@@ -120,7 +120,7 @@ struct TileBuffer {
 /// Value (i, j, k) of a block as double, indices in block.extended(). Slow: for tests, reference
 /// code and metadata.
 double valueAt(const Block& block, int i, int j, int k);
-/// The same of the stored values, which patches may override; indices in block.stored().
+/// The stored value at `at` as double, indices in block.stored(). Patches may override it. As slow as valueAt.
 double storedValueAt(const Block& block, const glm::ivec3& at);
 
 /// Value number `index` of an array of the type.

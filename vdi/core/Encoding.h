@@ -92,7 +92,8 @@ constexpr double typicalFileBytes(Precision precision) {
   return withSegment(precision, []<typename Segment>() { return EncodingOf<Segment>::typicalFileBytes; });
 }
 
-/// Bytes of so many lists in a file's chunk, before LZ4: the depth code if there is one, lengths, columns.
+/// Bytes of a file's chunk with these numbers of lists and supersegments, before LZ4: the depth code if there
+/// is one, lengths, columns.
 constexpr std::uint64_t chunkBytes(std::uint64_t lists, std::uint64_t supersegments, Precision precision) {
   return withSegment(precision, [&]<typename Segment>() -> std::uint64_t {
     using Encoding = EncodingOf<Segment>;

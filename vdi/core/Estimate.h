@@ -10,7 +10,7 @@
 
 namespace vdi {
 
-/// The bytes of lists with so many supersegments in all. `Number` is the type of the counts.
+/// The bytes of `lists` lists with `supersegments` supersegments in all. `Number` is the type of the counts.
 template <typename Number>
 constexpr Number bytesInMemory(Number lists, Number supersegments, Precision precision) {
   return lists * static_cast<Number>(sizeof(std::uint32_t)) +

@@ -27,8 +27,8 @@ void inOrder(std::size_t count, std::size_t ahead, const MakeWorker& makeWorker,
   std::mutex mutex;
   std::condition_variable changed;
   std::vector<std::optional<Result>> made(std::clamp<std::size_t>(ahead, 1, count));
-  std::size_t next = 0;   // to be made
-  std::size_t taken = 0;  // so many
+  std::size_t next = 0;   // the index of the next result to be made
+  std::size_t taken = 0;  // the number of results taken so far
   bool isEnding = false;
   const auto mayMake = [&] { return next < count && next < taken + made.size(); };
   const auto makeNext = [&](auto& make, std::unique_lock<std::mutex>& lock) {

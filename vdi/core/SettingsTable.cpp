@@ -45,7 +45,7 @@ constexpr Setting row(Setting setting) {
   return setting;
 }
 
-/// The same for an enumeration, with its toString and its ...FromString.
+/// A row of the table for an enumeration, with its toString and its ...FromString.
 template <auto Member, auto ToString, auto FromString>
 constexpr Setting namedRow(Setting setting) {
   using Enum = std::remove_reference_t<decltype(std::declval<GenerateSettings>().*Member)>;

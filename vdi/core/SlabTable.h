@@ -1,5 +1,5 @@
 // Pre-integrated classification (Engel, Kraus and Ertl, High-Quality Pre-Integrated Volume Rendering Using
-// Hardware-Accelerated Pixel Shading, 2001). A slab is the part of a ray that one sample stands for; its
+// Hardware-Accelerated Pixel Shading, 2001). A slab is the part of a ray that one sample represents; its
 // scalars run linearly from one value at its front to another at its back. The table misses no feature of the
 // transfer function between the two, however thin, and nearer material hides farther material.
 #pragma once

@@ -56,7 +56,7 @@ struct CompactSupersegment {
 };
 static_assert(sizeof(CompactSupersegment) == 8);
 
-/// Code c stands for the depth first + c * step, computed in single precision.
+/// Code c means the depth first + c * step, computed in single precision.
 struct DepthCode {
   static constexpr std::uint32_t largest = 16383;
   float first = 0.0F;

@@ -23,7 +23,7 @@ struct VdiDecoder::State {
   std::vector<std::byte> pending;  // the start of a part that isn't complete
   std::optional<Header> header;
   std::optional<std::vector<Chunk>> chunks;  // once the table has come
-  std::size_t decoded = 0;                   // so many of them
+  std::size_t decoded = 0;                   // the number of chunks decoded so far
   bool isComplete = false;
   Vdi vdi;
   std::exception_ptr failure;

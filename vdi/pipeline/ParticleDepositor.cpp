@@ -25,7 +25,7 @@ using gpu::shared::DepositParticle;
 
 namespace {
 
-/// So many entries are given to the device at a time: 76 bytes each.
+/// The number of entries, of 76 bytes each, that the device gets at a time.
 constexpr std::size_t entriesAtOnce = std::size_t{1} << 18;
 
 /// About the number of entries that a rank sends at a time, and of particles that it routes for them. This
@@ -42,7 +42,7 @@ struct Range {
   std::size_t last;
 };
 
-/// An invocation goes through so many cells at most, and twice through those of a kernel. Lavapipe ends an
+/// The most cells that an invocation goes through. It goes through those of a kernel twice. Lavapipe ends an
 /// invocation's loops after 65535 passes. On a GPU the bound keeps dispatches short.
 constexpr double mostCellsOnCpu = 1 << 14;
 constexpr double mostCellsOnGpu = 1 << 20;

@@ -258,7 +258,7 @@ std::vector<std::uint32_t> RayCaster::agreedWeights(const Cast& cast) {
   const std::uint32_t rows = gpu::groupsFor(cast.height, cast.build.countedStride);
   const auto weights = weightsReadback_.mappedAs<std::uint32_t>().first(rows);
   std::vector<std::uint32_t> result(weights.begin(), weights.end());
-  // Each counted list stands for a square of lists.
+  // Each counted list represents a square of lists.
   for (std::uint32_t& weight : result) weight *= cast.build.countedStride * cast.build.countedStride;
   return result;
 }

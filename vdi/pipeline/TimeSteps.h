@@ -29,7 +29,7 @@ class TimeSteps {
 
   const Scene& scene() const { return shown_.scene; }        // global
   const ScalarRange& scalarRange() const { return range_; }  // global
-  /// The rate that automaticRate stands for, with this transfer function and region; equal on all ranks. Not
+  /// The rate that automaticRate becomes with this transfer function and region; equal on all ranks. Not
   /// collective.
   double samplingRate(const TransferTable& table, const Region& region);
   /// Throws if the transfer function distinguishes values that floats cannot.

@@ -41,7 +41,7 @@ struct RayInputs {
 
 /// The samples of the ray through the centre of pixel (x, y) that `blocks` own, front to back, including
 /// transparent ones, up to the one at which the ray reaches the termination opacity. `atOnce` takes only
-/// samples whose number is a multiple of it; each stands for that many. The blend mode is Composite or
+/// samples whose number is a multiple of it; each counts for that many. The blend mode is Composite or
 /// Isosurface.
 std::vector<Interval> castRay(const RayInputs& inputs, std::span<const Block> blocks, int x, int y,
                               std::uint32_t atOnce = 1);

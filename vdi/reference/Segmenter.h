@@ -115,7 +115,7 @@ using shared::countedStride;
 using shared::sparePreSegments;
 using shared::uncountedSparePreSegments;
 
-/// Counts a list. `atOnce` is the number of samples that an interval stands for.
+/// Counts a list. `atOnce` is the number of samples that an interval represents.
 ListTolerance listToleranceOf(std::span<const Interval> intervals, const SegmentRules& rules,
                               std::size_t atOnce = 1);
 /// The tolerance of a list between counted ones: the geometric mean of their tolerances, with room for the

@@ -28,7 +28,7 @@ struct Slopes {
 /// Lengths in V_O's view, at the middle of the VDI's depths.
 struct SlopeUnit {
   float footprint = 0.0F;  // size of a pixel
-  float unit = 0.0F;       // depth per list that a slope of 1 stands for
+  float unit = 0.0F;       // depth per list at a slope of 1
 };
 SlopeUnit slopeUnitOf(const View& original, float nearest, float farthest);
 

@@ -17,7 +17,7 @@ namespace vdi::stream {
 /// together, on as many cores as they keep busy.
 class ArrivingVdi {
  public:
-  /// For a .vdi file of so many bytes.
+  /// For a .vdi file of `fileBytes` bytes.
   explicit ArrivingVdi(std::uint64_t fileBytes);
   /// The next bytes, of which a copy is kept.
   void add(std::span<const std::byte> bytes);

@@ -34,12 +34,12 @@ struct Frame {
 };
 using FramePtr = std::shared_ptr<const Frame>;
 
-/// A coarse level keeps one list in so many of each row and of each column. The numbers are odd, so that the
-/// ray of a coarse pixel is one of the VDI's.
+/// A coarse level of factor f keeps every f-th list of each row and of each column. The factors are odd, so
+/// that the ray of a coarse pixel is one of the VDI's.
 inline constexpr std::array<int, 3> coarseFactors{9, 5, 3};
 /// A level of fewer bytes in memory is the coarsest.
 inline constexpr std::uint64_t smallBytes = std::uint64_t{1} << 20;
-/// The coarse levels of a VDI of so many bytes in memory, the coarsest first.
+/// The factors of the coarse levels of a VDI that takes `bytes` bytes in memory, the coarsest first.
 std::vector<int> coarseFactorsOf(std::uint64_t bytes);
 
 /// Encodes a VDI, on all cores. Calls `take` on this thread: with the coarse levels, if there are any, and

@@ -16,7 +16,7 @@ constexpr double windowSeconds = 0.2;
 constexpr std::size_t ratesKept = 16;
 constexpr double burstSeconds = 0.05;
 constexpr double newPeriodShare = 0.3;
-/// Without a frame for so many periods, no newer one is expected.
+/// After this many periods without a frame, no newer one is expected.
 constexpr double silentPeriods = 2.0;
 /// The seconds that a frame's first picture may take in the finest of its coarse levels. A coarser level may
 /// take patienceGrowth times as long, because an even coarser one would lose still more of the picture.

@@ -24,7 +24,7 @@ inline constexpr std::size_t maxServerText = std::size_t{1} << 20;
 /// Bytes of a level in one binary message, at most; its head comes in front of them.
 inline constexpr std::size_t chunkBytes = std::size_t{256} << 10;
 inline constexpr std::size_t chunkHeadBytes = 16;
-/// A viewer acknowledges at least each of so many bytes.
+/// A viewer acknowledges at least every ackBytes bytes of a level.
 inline constexpr std::uint64_t ackBytes = std::uint64_t{512} << 10;
 /// Entries of a series in one message, at most.
 inline constexpr std::size_t seriesEntries = 4096;

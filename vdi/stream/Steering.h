@@ -47,7 +47,7 @@ struct GeneratorControls {
 /// The settings that can be steered, as they are in force.
 struct Controls {
   std::optional<GeneratorControls> generator;  // none: the VDIs come from elsewhere
-  int period = 1;                              // every so many steps a VDI is made
+  int period = 1;                              // a VDI is made every `period` steps
   bool paused = false;                         // the simulation waits
   std::vector<Parameter> parameters;
   bool operator==(const Controls&) const = default;

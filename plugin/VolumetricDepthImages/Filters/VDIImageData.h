@@ -50,9 +50,9 @@ void setPicture(vtkImageData* image, const vdi::Image& picture, bool withDepth);
 /// The picture that the image's RGBA hold, without depth. Throws vdi::Error{InvalidArgument} where it has
 /// none.
 vdi::Image pictureIn(vtkImageData* image);
-/// The flat picture of the VDI and the VDI itself.
+/// Stores the VDI and its flat picture in `image`.
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi);
-/// The same for a flat picture that exists already (vdi::flatten).
+/// Stores the VDI and `flat`, its flat picture that vdi::flatten has already made, in `image`.
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi, const vdi::Image& flat);
 /// Marks the image, whose VDI is being made. Bounds and camera are those of the VDI to come.
 void setBeingMade(vtkImageData* image, const vdi::Camera& camera, const vdi::Box& bounds);
@@ -73,7 +73,8 @@ std::optional<vdi::Coloring> coloringOf(vtkFieldData* fields);
 /// Returns false if the data object carries no VDI, as on ranks other than the root. Throws
 /// vdi::Error{Format} for a VDI that isn't sound.
 bool getVdi(vtkDataObject* data, vdi::Vdi& vdi);
-/// The same for an image's field data. Any thread may call it: it makes no VTK object.
+/// Reads the VDI from an image's field data. Returns false if they hold none, and throws
+/// vdi::Error{Format} for one that isn't sound. Any thread may call it: it makes no VTK object.
 bool getVdi(vtkFieldData* fields, vdi::Vdi& vdi);
 
 }  // namespace pv

@@ -74,7 +74,7 @@ class Preparation {
   std::jthread Worker;
 };
 
-/// Collective: whether `here` is true on all ranks of the controller. Null stands for this rank alone.
+/// Collective: whether `here` is true on all ranks of the controller. Null means this rank alone.
 bool onAllRanks(vtkMultiProcessController* controller, bool here);
 
 }  // namespace pv

@@ -27,8 +27,8 @@ std::vector<double> sampleOf(std::span<const vdi::Block> blocks, const vdi::Scal
 /// component or of the magnitude, are those of the shown values. Phases are an array of one component.
 /// Without a name or values it adds nothing.
 void setShownValues(vtkImageData* image, const vdi::ScalarArray& array, std::span<const double> values);
-/// The same for both ends of the coloring's range, if it has one. A VDI that was made elsewhere has only
-/// these.
+/// Adds both ends of the coloring's range, if it has one, as setShownValues adds values. A VDI that was made
+/// elsewhere has only these.
 void setShownRange(vtkImageData* image, const vdi::Coloring& coloring);
 
 }  // namespace pv

@@ -45,7 +45,7 @@ std::uint64_t newIdentity(vtkMultiProcessController* controller);
 /// are collective over the controller's ranks.
 class Volume {
  public:
-  /// The controller must live as long as there are users; null stands for this rank alone. `identity` comes
+  /// The controller must live as long as there are users; null means this rank alone. `identity` comes
   /// from newIdentity.
   Volume(vtkMultiProcessController* controller, std::uint64_t identity);
   ~Volume();  // call it on the main thread if there are several ranks: it frees a communicator

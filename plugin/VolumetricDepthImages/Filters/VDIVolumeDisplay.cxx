@@ -94,7 +94,7 @@ std::vector<vdi::Light> lightsOf(vtkSMRenderViewProxy* view) {
     lights.push_back({length > 0.0 ? direction / length : glm::dvec3(0.0, 0.0, 1.0), color});
   }
   if (isPlainHeadlight(shining)) lights.front().direction = glm::dvec3(0.0);
-  // An empty list stands for the light kit.
+  // An empty list means the light kit.
   if (lights.empty()) lights.push_back({glm::dvec3(0.0), glm::dvec3(0.0)});
   return lights;
 }

@@ -71,7 +71,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   static void SetCamera(vtkSMProxy* proxy, vtkSMRenderViewProxy* view);
   /// The reason why the view gives no viewpoint; empty if it gives one.
   static std::string WhyNot(vtkSMViewProxy* view);
-  /// The same for a viewpoint of this filter's volume, which the view must show.
+  /// The reason why the view gives no viewpoint of this filter's volume, which it must show; empty if it
+  /// gives one.
   std::string WhyNotFrom(vtkSMViewProxy* view);
   /// Sets camera and Resolution to the view's, and traces it. Returns "", or the reason why the view can't be
   /// used; then it sets nothing.

@@ -62,7 +62,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
 
   ///@{
   /**
-   * The distance over which the opacity function holds, in world units. 0 (default) stands for the scene's
+   * The distance over which the opacity function holds, in world units. 0 (default) means the scene's
    * diagonal divided by the cube root of the number of its voxels, the initial value of ParaView's volume
    * representation.
    */

@@ -10,7 +10,7 @@ namespace pv {
 /// Whether the source is visible in the view.
 bool shows(pqView* view, pqPipelineSource* source);
 
-/// The same for the source and for all that filters such as Render VDI make of it.
+/// Whether the view shows the source, or anything that filters such as Render VDI make of it.
 bool showsResultOf(pqView* view, pqPipelineSource* source);
 
 /// Renders the views that show the source, and all others that are out of date, such as those of Render VDI.
