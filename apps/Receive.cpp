@@ -95,8 +95,8 @@ class SeriesWalk {
   bool isDone(const stream::Client::Standing& standing) const {
     return next_ && hasEnded(standing) && *next_ >= *standing.series;
   }
-  /// Requests the first frame once the server has a finished series. One that was live and ends has none: it
-  /// says "ended" before it closes the connection.
+  /// Requests the first frame once the server has a finished series. A server that was live has none when it
+  /// ends: it says "ended" before it closes the connection.
   void begin(stream::Client& client, const stream::Client::Standing& standing) {
     if (next_ || !standing.isConnected || !hasEnded(standing) || standing.hasBeenLive) return;
     next_ = 0;

@@ -256,9 +256,9 @@ VDI_CATALYST_API int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const ch
  * if a script isn't loaded yet, as before the first step; if a script defines catalyst_execute, which runs at
  * each step; and if the trigger of an extractor is due. In a run without a script it is 1 if a frame is due
  * by step, time or clock, whether or not the data and the share of wall time will permit it, and at each step
- * if viewers may steer. Where scripts run in a process of its own, it is 1, too, while that is at work and
- * hasn't told yet. It is 0 for a null or finalized handle and for a step that vdi_catalyst_execute
- * refuses. */
+ * if viewers may steer. Where scripts run in a process of their own, it is 1, too, while that process is at
+ * work and hasn't answered yet. It is 0 for a null or finalized handle and for a step that
+ * vdi_catalyst_execute refuses. */
 VDI_CATALYST_API int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time);
 
 /* Runs the scripts on the blocks as they are now. `step` is the same on all ranks, from 0 to INT32_MAX,

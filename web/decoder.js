@@ -1,6 +1,6 @@
-// Prepares VDIs for the renderer. A worker does so, and the picture keeps moving meanwhile. The
-// worker runs the page's own script, which does nothing else there. If a browser refuses workers,
-// the page decodes in short steps.
+// Prepares VDIs for the renderer, on a worker, so that the picture keeps moving. The worker runs
+// the page's own script, which does nothing else there. If a browser refuses workers, the page
+// decodes in short steps.
 
 import {decodeVdi} from "./format.js";
 import {expandedSegments, headsOf} from "./heads.js";

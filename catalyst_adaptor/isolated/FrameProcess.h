@@ -19,9 +19,9 @@
 
 namespace vdi::catalyst {
 
-/// No function is collective, and none waits but for the time that it is given. Ranks learn of frames that
-/// are made at different moments: IsolatedRun makes them agree. So functions that talk with the process don't
-/// throw: without memory for what it has said, the process is given up.
+/// No function is collective, and each waits for the given time at most. Ranks learn of finished frames at
+/// different moments; IsolatedRun makes them agree. So functions that talk with the process don't throw: if
+/// there is no memory for its messages, they give the process up.
 class FrameProcess {
  public:
   using Milliseconds = std::chrono::milliseconds;

@@ -159,7 +159,7 @@ std::pair<IsolatedRun::Wait, std::int64_t> IsolatedRun::wait(Progress progress, 
     if (!isStopped) lastRun = Clock::now();
     const bool isLate = rank_ == 0 && since(lastGrowth) > limit;
     const bool isStoppedLong = isStopped && since(lastRun) > stopLimit;
-    // A job that is over has lost the processes that haven't come, on whatever host.
+    // Once the job is over, processes that haven't come yet never will, on any host.
     const bool isLost = job_ && !process_->startCode() && job_->isOver(Milliseconds(0));
     const std::int64_t mine = progress();
     const bool isGone = (process_->isGone() || isLost) && mine < goal;

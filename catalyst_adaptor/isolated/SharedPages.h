@@ -14,7 +14,7 @@ namespace vdi::catalyst {
 class SharedPages {
  public:
   SharedPages() = default;
-  /// All of it is allocated here, so that a later write can't fail. Throws std::runtime_error if there is no
+  /// Allocates all pages at once, so that a later write can't fail. Throws std::runtime_error if there is no
   /// room.
   explicit SharedPages(std::uint64_t bytes);
   /// Maps pages that the other process has made. Throws std::runtime_error.

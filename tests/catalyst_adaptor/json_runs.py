@@ -190,7 +190,7 @@ def full():
 
 
 def limited():
-    """A limit of file sizes fails the step that meets it, also where only the log does. The next step works."""
+    """A step fails if a file, or the log alone, reaches the limit of file sizes. The next step works."""
     run({"output": "v_{timestep}.vdi"}, 0, 3, 0, VDI_TEST_LIMIT="4096", said="File too large")
     assert made() == ["v_0.vdi", "v_2.vdi"], made()
     run({"output": "l_{timestep}.vdi", "max_share": 0.0001, "log": "run.jsonl"}, 0, 3, 0, VDI_TEST_LIMIT="1",

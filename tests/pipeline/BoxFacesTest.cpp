@@ -16,7 +16,7 @@ using synthetic::Layout;
 
 namespace {
 
-/// Opaque enough that the box's faces are what one sees.
+/// A function so opaque that views show little but the box's faces.
 TransferFunction dense() {
   TransferFunction function;
   function.colors = {{0.0, {0.0, 0.0, 1.0}}, {0.5, {0.0, 1.0, 0.0}}, {1.0, {1.0, 0.0, 0.0}}};

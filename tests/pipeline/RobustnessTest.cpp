@@ -276,7 +276,7 @@ TEST_CASE("many bands, one narrow band, constant data, one opaque voxel: V_O's p
 
   generator.setBlocks(
       {cube(17, 1.0 / 16.0, [](const glm::ivec3& i) { return i == glm::ivec3(8) ? 1.0F : 0.0F; })});
-  // At one sample a voxel, volume rendering itself may or may not hit it from the side.
+  // At one sample a voxel, volume rendering itself may miss the opaque voxel from the side.
   GenerateSettings fine = test::smallSettings(160, 120, 6);
   fine.samplesPerVoxel = 4.0;
   requireFaithful(generator, test::oblique(), band(1.0, 0.8), fine);

@@ -184,7 +184,7 @@ TEST_CASE("rays that end at objects, of any part of an image plane: as in the re
         CHECK(hidden + dimmed > 50);
         for (VdiRenderer* each : {&renderer, &rendererAsGpu}) {
           CHECK(isView(each->render(view, ends, reconstruction), expected, reconstruction));
-          // It leaves no trace.
+          // The view with ends doesn't affect the next one without.
           CHECK(isView(each->render(view, {}, reconstruction), open, reconstruction));
         }
       }

@@ -79,7 +79,7 @@ def command(image, name):
 
 
 def wait_for(images):
-    """As windows do: each filter is served in turn."""
+    """Serves each filter in turn, as windows do, until all preparations end."""
     end = time.monotonic() + 60
     # Scripts of programmable filters import NumPy's names here, `any` among them.
     while np.any([0 <= asked(image, "Preparation") < 100 for image in images]) and time.monotonic() < end:

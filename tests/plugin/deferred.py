@@ -97,7 +97,7 @@ for frequency, deferred in ((20, second), (30, third)):
     check(np.shape(deferred) == np.shape(codes(image)) and same(deferred, codes(image)),
           "the same VDI is made in place, at frequency %d" % frequency)
 
-# Time steps: the view asks, and nobody is told but by the update of the view.
+# Time steps: the view asks for them, and only its update tells others.
 steps = simple.ProgrammableFilter(Input=wavelet, CopyArrays=0, RequestInformationScript=STEPS, Script=SCALED)
 image.Input = steps
 view.ViewTime = 0.0

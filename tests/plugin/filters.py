@@ -174,7 +174,7 @@ for position, view_up, degrees in OBLIQUE:
     similar = ssim(turned.astype(np.uint8), picture(vdi_of(wavelet, PictureOnly=1, **there)))
     check(similar > 0.97, "a turned view is volume rendering from there, SSIM %.4f" % similar)
 
-# A series is time steps.
+# A series of files has time steps.
 second = os.path.join(OUTPUT, "series_1.vdi")
 simple.SaveData(os.path.join(OUTPUT, "series_0.vdi"), proxy=image)
 simple.SaveData(second, proxy=vdi_of(wavelet, Supersegments=3))

@@ -1,4 +1,4 @@
-"""A .vdi file shown where there's no Vulkan device (VK_ICD_FILENAMES names none): a message that says what helps."""
+"""A .vdi file shown where there's no Vulkan device (VK_ICD_FILENAMES names none): a message names the remedy."""
 
 import os
 import sys

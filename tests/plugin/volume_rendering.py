@@ -92,7 +92,7 @@ for name, (nodes, least) in FUNCTIONS.items():
         write_png("brain_%s_%s.png" % (name, what.split()[-1]), np.hstack([once, fine]))
     simple.Delete(view)
 
-# A colour map without red, of floats: there is none in the picture, either.
+# A colour map without red, for floats: the picture has no red, either.
 brain, spacing = read_brain("inia19-t1-brain")
 brain = brain.astype(np.float32)
 brain /= brain.max()

@@ -22,7 +22,7 @@ FramePtr frameOf(std::uint32_t id, const std::vector<std::size_t>& bytes, std::u
   return frame;
 }
 
-/// A viewer behind a line of that many bytes a second, that acknowledges all it gets.
+/// A viewer on a line of `bytesPerSecond`. It acknowledges all that it gets.
 class Line {
  public:
   Line(Outbox& outbox, double bytesPerSecond) : outbox_(outbox), rate_(bytesPerSecond) {}

@@ -171,7 +171,7 @@ def slowly(server):
 
 
 def frames(server, file, live):
-    """They appear one after the other. One viewer takes them, one takes nothing."""
+    """Frames appear one after the other. One viewer takes them, the other takes nothing."""
     levels = viewer_of(server).levels()
     stalled = viewer_of(server)
     before = None

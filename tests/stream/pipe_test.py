@@ -31,7 +31,7 @@ def serving_at_a_pipe(folder):
 
 
 def listens(process):
-    """Whether it has a TCP socket that listens."""
+    """Whether the process has a listening TCP socket."""
     inodes = set()
     for table in ("tcp", "tcp6"):
         for line in pathlib.Path(f"/proc/{process}/net/{table}").read_text().splitlines()[1:]:

@@ -30,7 +30,7 @@ def tools_picture(vdi, view, path):
 
 def likeness(screenshot, box, vdi, state, kept):
     """SSIM of the middle of the view in `screenshot` and of the tool's picture; the view's background is black. `box`: left,
-    top, width and height of the view in it, to some pixels. `kept`: where to leave what's compared, without ".png"."""
+    top, width and height of the view in it, to some pixels. `kept`: the compared pictures' path, without ".png"."""
     expected = tools_picture(vdi, view_in(state), kept + "_tool.png")
     screen = skimage.io.imread(screenshot)[..., :3].astype(float)
     left, top = box[:2]
@@ -41,7 +41,7 @@ def likeness(screenshot, box, vdi, state, kept):
 
     inner = middle_of(expected, 0, 0)
     assert inner.std() > 10, "the tool's picture shows next to nothing"
-    # Its place, where it fits best: frames of windows are some pixels wide.
+    # The view is where its picture fits best: frames of windows are some pixels wide.
     places = [(row, column) for row in range(top - 8, top + 9) for column in range(left - 8, left + 9)]
     row, column = min(places, key=lambda place: np.abs(middle_of(screen, *place)[::4, ::4] - inner[::4, ::4]).mean())
     seen = middle_of(screen, row, column)

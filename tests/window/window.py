@@ -221,7 +221,7 @@ class Window:
     """ParaView's main window, without settings of the user's and without our plugin."""
 
     def __init__(self, screen, *arguments, output=".", folder=None):
-        """`output`: the folder of screenshots and of the log; `folder`: that in which ParaView's dialogs begin."""
+        """`output`: the folder of screenshots and of the log; `folder`: the one that ParaView's file dialogs show first."""
         self.middle = None
         self.screen, self.arguments, self.output, self.folder = screen, arguments, output, folder
 
@@ -401,12 +401,12 @@ class Window:
     def edit_colors(self):
         """Opens the editor of the VDI's colour map. Returns the screen position of the last opacity point."""
         self.click("Edit Color Map and Opacity")
-        button = self.find("Rescale to data range", within=self.find(COLOR_EDITOR, "dialog"))  # it's left of that
+        button = self.find("Rescale to data range", within=self.find(COLOR_EDITOR, "dialog"))  # just right of the last point
         left, top, _, _ = button.box
         return left - 7, top + 8
 
     def is_making(self, panel):
-        """Whether the panel says that the VDI is made anew. Looked for there alone: a small one is soon made."""
+        """Whether the panel says that the VDI is made anew. It looks in `panel` alone, because a small VDI is soon made."""
         return self.text_that_begins("Making the VDI anew", panel) is not None
 
     def save(self, item, name, picture=None, extension=""):

@@ -46,7 +46,7 @@ class HostMemory {
   std::span<std::byte> bytes_;
   std::string name_;
   int descriptor_ = -1;  // of shareable memory, until unlink; its lock shows that this process lives
-  bool linked_ = false;  // and this object has to unlink it
+  bool linked_ = false;  // the name exists, and this object has to unlink it
 };
 
 }  // namespace vdi

@@ -34,11 +34,10 @@ class CastPass {
   /// they are first recorded.
   void bind(const VolumeStore& volume) { volume_ = &volume; }
 
-  /// The purpose of a dispatch: Volume renders the picture, or the extremes that
-  /// it shows (CastParams::blendMode). Histogram counts the demand of lists, and
-  /// CountLevels the counts that this rank shares with others; both are for merging. Count is the first step
-  /// of an algorithm (sensitivities or tolerances, and counts), Write the second one (supersegments or
-  /// pre-segments).
+  /// The purpose of a dispatch. Volume renders the picture, or the extremes that it shows
+  /// (CastParams::blendMode). Histogram counts the demand of lists, and CountLevels the counts that this rank
+  /// shares with others; both are for merging. Count is the first step of an algorithm (sensitivities or
+  /// tolerances, and counts), Write the second one (supersegments or pre-segments).
   enum class Work { Volume, Histogram, CountLevels, Count, Write };
   struct Band {
     std::uint32_t width = 0;

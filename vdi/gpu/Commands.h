@@ -103,7 +103,7 @@ class Commands {
   void copy(const Buffer& from, std::uint64_t fromOffset, const Buffer& to, std::uint64_t toOffset,
             std::uint64_t bytes);
   void fill(const Buffer& buffer, std::uint32_t word);  // the whole buffer
-  /// Fills whole words.
+  /// Fills part of the buffer: `offset` and `bytes` are multiples of a word's 4 bytes.
   void fill(const Buffer& buffer, std::uint64_t offset, std::uint64_t bytes, std::uint32_t word);
   /// Writes the buffer's first bytes, carried by the command buffer: whole words, 64 KiB at most.
   void update(const Buffer& buffer, std::span<const std::byte> bytes);

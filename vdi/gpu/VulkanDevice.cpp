@@ -105,7 +105,7 @@ VulkanDevice::~VulkanDevice() {
   release();
 }
 
-/// Keeps compiled shaders if there are others than those that the file had.
+/// Writes the compiled shaders to the cache's file if their bytes differ in number from those it had.
 void VulkanDevice::saveCache() const noexcept {
   try {
     std::size_t bytes = 0;

@@ -49,7 +49,7 @@ class Frames {
 
   bool underWay() const;
   /// The first flight without a frame under way, so that frames that do not overlap always use the same
-  /// memory. Otherwise the older frame's, which the caller must complete first.
+  /// memory. If both have one, the older frame's flight: the caller must complete that frame first.
   Flight& next();
   /// Collective: hands the last bands of all frames under way to their sinks.
   void addLastBands();

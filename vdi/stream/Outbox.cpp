@@ -76,7 +76,7 @@ void Outbox::release() {
       current_ = std::make_shared<Frame>(std::move(first));
     }
   } else if (nextLevel_ == current_->levelCount && !isUnderWay() && !current_->levels.empty()) {
-    Frame sent = *current_;  // which one that was counts, not what was in it
+    Frame sent = *current_;  // later decisions need its identity, not its levels' bytes
     sent.levels.clear();
     current_ = newest_ = std::make_shared<Frame>(std::move(sent));
   }

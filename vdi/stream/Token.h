@@ -18,7 +18,7 @@ std::string randomToken();
 /// as requireToken does; messages have the path, never the token.
 std::string tokenIn(const std::filesystem::path& file);
 /// Throws Error{InvalidArgument} unless the token has at least shortestToken characters, at most 256, all of
-/// them letters, digits, '-', '.', '_' or '~': it stands in links. `origin` is where it comes from.
+/// them letters, digits, '-', '.', '_' or '~', because links contain it. `origin` names its source.
 void requireToken(const std::string& token, const std::string& origin);
 
 /// Compares tokens in a time that says nothing about the right one. It keeps a digest alone.

@@ -95,7 +95,7 @@ Socket::Received greetingOf(const std::string& name, int ranks, Socket& socket) 
   return {};
 }
 
-/// The rank's environment, with what belongs to this process's own MPI job.
+/// The rank's environment, with the variables of this process's own MPI job in place of the rank's.
 std::vector<std::string> environmentOf(const Setup& setup) {
   std::vector<std::string> variables;
   for (char** own = environ; *own != nullptr; ++own) {
@@ -185,7 +185,8 @@ int serve(const std::string& name, int ranks) {
   end.put(Say::Ended);
   end.put(std::int32_t{status});
   (void)socket.send(end.bytes());
-  // A launcher would end the whole job now. The simulation does that when all its ranks know.
+  // If this process ended now, a launcher would end the whole job. The simulation does that once all its
+  // ranks know.
   const bool isGood = WIFEXITED(status) && WEXITSTATUS(status) == 0;
   if (!isGood) poll(events.data(), 1, -1);
   return isGood ? 0 : 1;

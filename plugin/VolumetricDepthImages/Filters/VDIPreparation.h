@@ -55,7 +55,7 @@ class Preparation {
   enum class End { Good, GivenUp, Failed };
   /// Collective: waits for the end, which is the same on all ranks. Calls `whileWaiting` now and then.
   End wait(const std::function<void()>& whileWaiting);
-  /// Valid after a good end.
+  /// `output` and `share` are valid once `wait` has returned End::Good.
   vtkVDIImageData* output() { return Output; }
   double share() const { return Share; }
 

@@ -59,7 +59,7 @@ class Volume {
   bool hasRanks() const { return hasRanks_; }
   std::uint64_t identity() const { return identity_; }
 
-  // Any thread.
+  // Any thread may call the following.
   /// Whether there is a generator.
   bool isMade() const;
   /// Whether this rank's device was lost; it stays so.

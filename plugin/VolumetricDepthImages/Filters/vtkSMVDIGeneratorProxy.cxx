@@ -197,7 +197,7 @@ void vtkSMVDIGeneratorProxy::UpdatePipeline() {
   if (!EnterUpdate(this)) return;
   this->TakeWhatIsNotSet(std::nullopt);
   const bool isForView = this->UpdatesForView;
-  // A view that got an earlier output has left the proxy as updated, and the superclass would do nothing.
+  // After a view got an earlier output, the proxy counts as updated, and the superclass would do nothing.
   if (!isForView && this->IsOutdated()) this->MarkDirty(this);
   if (isForView) this->InvokeCommand("BeginView");
   this->Superclass::UpdatePipeline();

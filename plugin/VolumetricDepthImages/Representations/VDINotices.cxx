@@ -36,7 +36,7 @@ std::optional<vdi::ViewpointIssue> issueOf(vtkProp* prop, const vdi::View& view)
     return vdi::ViewpointIssue::SeesNothing;
   vdi::Box box = boxOf(bounds);
   constexpr double beyond = std::numeric_limits<double>::max();
-  for (int axis = 0; axis < 3; ++axis) {  // a flat object isn't an empty box
+  for (int axis = 0; axis < 3; ++axis) {  // so that a flat object's box isn't empty
     box.lo[axis] = std::nextafter(box.lo[axis], -beyond);
     box.hi[axis] = std::nextafter(box.hi[axis], beyond);
   }
