@@ -109,7 +109,7 @@ image.SMProxy.InvokeCommand("Prepare")
 image.SMProxy.InvokeCommand("Hold")
 image.SMProxy.InvokeCommand("Release")
 image.SMProxy.MarkDirty(image.SMProxy)
-check(picture(image).shape == (300, 400, 3), "what was given up is made by the update")
+check(picture(image).shape == (300, 400, 3), "the update makes the VDI that was given up")
 image.SamplingRate = 3
 image.SMProxy.InvokeCommand("Prepare")
 simple.Delete(image)

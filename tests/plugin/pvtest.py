@@ -76,7 +76,7 @@ def vdi_in_page(page, path):
         found = re.findall(r'<script class="vdi-frame"[^>]* data-size="(\d+)">([^<]*)</script>', file.read())
     check(len(found) == 1, "a page has one VDI, not %d" % len(found))
     data = zlib.decompress(base64.b64decode(found[0][1]), wbits=-15)
-    check(len(data) == int(found[0][0]), "it takes as many bytes as the page says")
+    check(len(data) == int(found[0][0]), "the page's VDI takes as many bytes as the page says")
     with open(path, "wb") as file:
         file.write(data)
     return path

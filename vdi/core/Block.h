@@ -120,7 +120,7 @@ struct TileBuffer {
 /// Value (i, j, k) of a block as double, indices in block.extended(). Slow: for tests, reference
 /// code and metadata.
 double valueAt(const Block& block, int i, int j, int k);
-/// The stored value at `at` as double, indices in block.stored(). Patches may override it. As slow as valueAt.
+/// The stored value at `at` as double, indices in block.stored(). Patches may override it. Slow like valueAt.
 double storedValueAt(const Block& block, const glm::ivec3& at);
 
 /// Value number `index` of an array of the type.
