@@ -1,7 +1,7 @@
 #pragma once
 // The differences among the versions of ParaView from 5.11 to 6.x. The code tests features rather than
-// version numbers where it can. The CMake half is cmake/ParaViewVersions.cmake. No other file asks for a
-// version.
+// version numbers where it can. The CMake half is cmake/ParaViewVersions.cmake. No other file asks for the
+// version of ParaView or VTK, as tests/IncludesTest.cmake checks.
 
 #include <vtkPVVersion.h>
 #include <vtkType.h>
