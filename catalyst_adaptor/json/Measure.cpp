@@ -78,7 +78,7 @@ void withLoad(int type, Visit visit) {
 /// Goes through the values of a part.
 class Sweep {
  public:
-  Sweep(const Measure::Part& part, const StridedValues& values, int component)
+  Sweep(const Measure::OwnedPart& part, const StridedValues& values, int component)
       : part_(part), values_(values), component_(values.components > 1 ? component : 0) {}
 
   template <typename Loader>
@@ -126,15 +126,15 @@ class Sweep {
     return std::sqrt(squares);
   }
 
-  const Measure::Part& part_;
+  const Measure::OwnedPart& part_;
   const StridedValues& values_;
   int component_;  // or magnitude, or phase
 };
 
 /// The part of a block; nullopt if it owns no value.
-std::optional<Measure::Part> Measure::partOf(std::size_t index, const Block& block) {
+std::optional<Measure::OwnedPart> Measure::partOf(std::size_t index, const Block& block) {
   constexpr double least = 1e-3;  // share of a spacing by which coinciding faces may differ
-  Part part;
+  OwnedPart part;
   part.block = index;
   for (int axis = 0; axis < 3; ++axis) {
     const double spacing = block.spacing[axis];
@@ -170,7 +170,7 @@ void Measure::findParts(const comm::Communicator& comm, const Fields& fields, bo
   comm.together([&] {
     parts_.clear();
     for (const Block& place : places) {
-      std::optional<Part> part = partOf(indexOf(place), place);
+      std::optional<OwnedPart> part = partOf(indexOf(place), place);
       if (part) parts_.push_back(std::move(*part));
     }
   });
@@ -186,7 +186,7 @@ std::optional<double> Measure::of(const comm::Communicator& comm, const Fields& 
   comm.together([&] {
     const Fields::Values values = fields.valuesOf(condition_.field, cells, condition_.component);
     withLoad(values.type, [&](auto load) {
-      for (const Part& part : parts_) {
+      for (const OwnedPart& part : parts_) {
         const Sweep sweep(part, values.blocks[part.block], condition_.component);
         totals.take(sweep.run(load));
       }

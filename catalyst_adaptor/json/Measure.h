@@ -29,16 +29,16 @@ class Measure {
  private:
   /// The part of a block that it owns: along each axis, the length of each value's extent that lies in it, in
   /// world units.
-  struct Part {
+  struct OwnedPart {
     std::size_t block = 0;
     std::array<std::int64_t, 3> first{};  // indices of values
     std::array<std::vector<double>, 3> extents;
   };
-  static std::optional<Part> partOf(std::size_t index, const Block& block);
+  static std::optional<OwnedPart> partOf(std::size_t index, const Block& block);
   void findParts(const comm::Communicator& comm, const Fields& fields, bool cells);
 
   config::RunCondition condition_;
-  std::vector<Part> parts_;
+  std::vector<OwnedPart> parts_;
   /// The blocks whose parts these are: their version, kind of values, and each one's index and place of its
   /// first value.
   std::optional<std::uint64_t> version_;

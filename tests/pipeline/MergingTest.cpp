@@ -138,7 +138,7 @@ TEST_CASE("ranks that agree on one tolerance: each one's lists are those of the 
   std::size_t supersegmentsInAll = 0;
   std::vector<std::vector<std::uint32_t>> weights;
   for (std::size_t r = 0; r < ranks; ++r) {
-    casters[r]->agree(casts[r], std::span(&stretch, 1));
+    casters[r]->takeLevelSum(casts[r], std::span(&stretch, 1));
     detail::DeviceLists lists;
     casters[r]->makeBand(casts[r], 0, 43, lists);
     weights.push_back(casters[r]->agreedWeights(casts[r]));

@@ -88,9 +88,9 @@ std::string nameOf(const BlockEntry& entry) {
 
 }  // namespace
 
-Level levelOf(const BlockEntry& block, const BlockEntry& comparedWith) {
+LevelOrder levelOrderOf(const BlockEntry& block, const BlockEntry& comparedWith) {
   const double ratio = block.valueVolume() / comparedWith.valueVolume();
-  return ratio < 0.99 ? Level::Finer : ratio > 1.0 / 0.99 ? Level::Coarser : Level::Same;
+  return ratio < 0.99 ? LevelOrder::Finer : ratio > 1.0 / 0.99 ? LevelOrder::Coarser : LevelOrder::Same;
 }
 
 BoxTree::BoxTree(std::vector<Box> boxes) : boxes_(std::move(boxes)), order_(boxes_.size()) {
@@ -239,8 +239,9 @@ double BlockDirectory::gapBeside(std::size_t index, const Box& box, int axis, bo
     const double end = above ? other.owned.hi[axis] - box.hi[axis] : box.lo[axis] - other.owned.lo[axis];
     if (end <= tolerance[axis] || !overlapBy(across, other.owned, tolerance)) continue;
     if (distance <= tolerance[axis]) return 0.0;  // no gap
-    const Level level = levelOf(other, own);
-    if (level == Level::Finer || (level == Level::Same && above)) nearest = std::min(nearest, distance);
+    const LevelOrder order = levelOrderOf(other, own);
+    if (order == LevelOrder::Finer || (order == LevelOrder::Same && above))
+      nearest = std::min(nearest, distance);
   }
   return nearest <= widest ? nearest : 0.0;
 }
@@ -257,13 +258,14 @@ std::vector<OwnParts> settleOverlaps(const Communicator& comm, const BlockDirect
         const BlockEntry& other = entries[j];
         const glm::dvec3 tolerance = toleranceOf(own, other);
         if (j == i || !overlapBy(own.owned, other.owned, tolerance)) continue;
-        const Level level = levelOf(other, own);
-        if (level == Level::Same && overlapBy(own.asked, other.asked, tolerance)) {
+        const LevelOrder order = levelOrderOf(other, own);
+        if (order == LevelOrder::Same && overlapBy(own.asked, other.asked, tolerance)) {
           const std::uint64_t pair = std::min(i, j) * entries.size() + std::max(i, j);
           conflict[0] = std::max(conflict[0], ~pair);
         }
         // If two blocks of one level have closed a gap, the first one keeps the common part.
-        if (level == Level::Finer || (level == Level::Same && j < i)) left.finer.push_back(other.owned);
+        if (order == LevelOrder::Finer || (order == LevelOrder::Same && j < i))
+          left.finer.push_back(other.owned);
       }
       left.boxes = withoutAll(own.owned, left.finer);
     }

@@ -42,10 +42,10 @@ struct BlockEntry {
   }
 };
 
-/// Compares the volumes that one value of each block represents. Volumes that differ by at most 1 % are of
-/// the same level.
-enum class Level { Finer, Same, Coarser };
-Level levelOf(const BlockEntry& block, const BlockEntry& comparedWith);
+/// How the level of a block compares with that of another one: by the volumes that one value of each
+/// represents. Volumes that differ by at most 1 % are of the same level.
+enum class LevelOrder { Finer, Same, Coarser };
+LevelOrder levelOrderOf(const BlockEntry& block, const BlockEntry& comparedWith);
 
 /// A search tree of boxes, to find those near a box without looking at all of them.
 class BoxTree {

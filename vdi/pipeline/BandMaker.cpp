@@ -70,7 +70,7 @@ void BandMaker::agreeOnLists(RayCaster::Cast& cast) {
     std::vector<RayCaster::LevelSum> sum;
     for (const comm::ByteSum::Stretch& stretch : stretches)
       sum.push_back({&accesses_.of(stretch.place.memory), stretch.place.at, stretch.first, stretch.bytes});
-    caster_.agree(cast, sum);
+    caster_.takeLevelSum(cast, sum);
   });
 }
 

@@ -216,7 +216,7 @@ void RayCaster::countLevels(Cast& cast, HostAccess& memory, std::uint64_t at) {
   }
 }
 
-void RayCaster::agree(Cast& cast, std::span<const LevelSum> sum) {
+void RayCaster::takeLevelSum(Cast& cast, std::span<const LevelSum> sum) {
   const std::uint32_t width = cast.build.countedWidth();
   const std::uint32_t rows = gpu::groupsFor(cast.height, cast.build.countedStride);
   const std::uint64_t words = std::uint64_t{width} * rows * sizeof(std::uint32_t);

@@ -69,7 +69,7 @@ class RayCaster {
     std::uint64_t first = 0;
     std::uint64_t bytes = 0;
   };
-  void agree(Cast& cast, std::span<const LevelSum> sum);
+  void takeLevelSum(Cast& cast, std::span<const LevelSum> sum);
   /// Call after that: the number of supersegments that all ranks together will have in each stretch of
   /// shared::countedStride rows.
   std::vector<std::uint32_t> agreedWeights(const Cast& cast);

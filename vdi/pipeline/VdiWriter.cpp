@@ -110,7 +110,7 @@ void VdiWriter<Segment>::add(std::uint64_t firstList, const ListsOf<Segment>& li
 }
 
 template <typename Segment>
-void VdiWriter<Segment>::append(Part& part, const ListsOf<Segment>& lists, std::size_t first,
+void VdiWriter<Segment>::append(ChunkPart& part, const ListsOf<Segment>& lists, std::size_t first,
                                 std::size_t last) const {
   const auto offsets = std::span(lists.offsets).subspan(first, last - first + 1);
   const auto before = static_cast<std::uint32_t>(part.lists.segments.size());
@@ -128,10 +128,10 @@ void VdiWriter<Segment>::addToPart(std::uint64_t firstList, const ListsOf<Segmen
   const bool goesOn =
       !parts_.empty() && parts_.back().end() == firstList && firstList % io::listsPerChunk != 0;
   if (!goesOn) parts_.push_back({firstList, {}});
-  Part& part = parts_.back();
+  ChunkPart& part = parts_.back();
   append(part, lists, first, last);
   if (part.firstList % io::listsPerChunk != 0 || part.end() != chunkEnd(part.firstList)) return;
-  const Part whole = std::move(part);
+  const ChunkPart whole = std::move(part);
   parts_.pop_back();
   encode(whole.lists, 0, whole.lists.listCount(), whole.firstList);
 }
@@ -164,7 +164,7 @@ std::vector<typename VdiWriter<Segment>::Route> VdiWriter<Segment>::routeParts()
   std::vector<NoteOf<PartNote>> notes = shareNotes<PartNote>(comm_, [&] {
     std::vector<PartNote> mine;
     mine.reserve(parts_.size());
-    for (const Part& part : parts_)
+    for (const ChunkPart& part : parts_)
       mine.push_back({part.firstList, part.lists.listCount(), part.lists.segments.size()});
     return mine;
   });
@@ -188,10 +188,10 @@ std::vector<typename VdiWriter<Segment>::Route> VdiWriter<Segment>::routeParts()
 
 /// Collective: sends this rank's parts, and returns those from other ranks, in the order of their lists.
 template <typename Segment>
-std::vector<typename VdiWriter<Segment>::Part> VdiWriter<Segment>::exchangeParts(
+std::vector<typename VdiWriter<Segment>::ChunkPart> VdiWriter<Segment>::exchangeParts(
     std::span<const Route> routes) {
   comm::Messages messages(comm_);
-  std::vector<Part> received;
+  std::vector<ChunkPart> received;
   comm_.together([&] {
     for (const Route& route : routes) {
       const bool own = route.from == comm_.rank();
@@ -226,15 +226,15 @@ std::vector<typename VdiWriter<Segment>::Part> VdiWriter<Segment>::exchangeParts
 
 /// Joins and encodes the chunks whose parts come to this rank.
 template <typename Segment>
-void VdiWriter<Segment>::encodeJoined(std::span<const Route> routes, std::span<const Part> received) {
+void VdiWriter<Segment>::encodeJoined(std::span<const Route> routes, std::span<const ChunkPart> received) {
   auto nextReceived = received.begin();
   auto nextOwn = parts_.begin();
-  Part whole;
+  ChunkPart whole;
   for (const Route& route : routes) {
     const bool own = route.from == comm_.rank();
     if (route.to == comm_.rank()) {
       if (route.firstList % io::listsPerChunk == 0) whole = {route.firstList, {}};
-      const Part& part = own ? *nextOwn : *nextReceived++;
+      const ChunkPart& part = own ? *nextOwn : *nextReceived++;
       append(whole, part.lists, 0, part.lists.listCount());
       if (whole.end() == chunkEnd(whole.firstList))
         encode(whole.lists, 0, whole.lists.listCount(), whole.firstList);
@@ -248,9 +248,9 @@ void VdiWriter<Segment>::encodeJoined(std::span<const Route> routes, std::span<c
 template <typename Segment>
 void VdiWriter<Segment>::joinParts() {
   std::sort(parts_.begin(), parts_.end(),
-            [](const Part& a, const Part& b) { return a.firstList < b.firstList; });
+            [](const ChunkPart& a, const ChunkPart& b) { return a.firstList < b.firstList; });
   const std::vector<Route> routes = routeParts();
-  const std::vector<Part> received = exchangeParts(routes);
+  const std::vector<ChunkPart> received = exchangeParts(routes);
   comm_.together([&] { encodeJoined(routes, received); });
 }
 

@@ -48,7 +48,7 @@ class VdiWriter {
 
  private:
   /// Lists that are not a whole chunk, or not yet.
-  struct Part {
+  struct ChunkPart {
     std::uint64_t firstList = 0;
     ListsOf<Segment> lists;
     std::uint64_t end() const { return firstList + lists.listCount(); }
@@ -76,13 +76,13 @@ class VdiWriter {
 
   bool isRoot() const { return comm_.rank() == root_; }
   std::uint64_t chunkEnd(std::uint64_t list) const;
-  void append(Part& part, const ListsOf<Segment>& lists, std::size_t first, std::size_t last) const;
+  void append(ChunkPart& part, const ListsOf<Segment>& lists, std::size_t first, std::size_t last) const;
   void addToPart(std::uint64_t firstList, const ListsOf<Segment>& lists, std::size_t first, std::size_t last);
   void encode(const ListsOf<Segment>& lists, std::size_t first, std::size_t last, std::uint64_t firstList);
   void keep(std::uint64_t index, io::EncodedChunk chunk);
   std::vector<Route> routeParts() const;
-  std::vector<Part> exchangeParts(std::span<const Route> routes);
-  void encodeJoined(std::span<const Route> routes, std::span<const Part> received);
+  std::vector<ChunkPart> exchangeParts(std::span<const Route> routes);
+  void encodeJoined(std::span<const Route> routes, std::span<const ChunkPart> received);
   void joinParts();
   Table shareTable() const;
   std::filesystem::path prepareFile(const Table& table);
@@ -97,7 +97,7 @@ class VdiWriter {
   std::uint64_t listCount_;
   std::unique_ptr<io::OutputFile> file_;  // the root's
   std::vector<std::byte> tail_;           // the root's: the bytes after the chunks
-  std::vector<Part> parts_;               // the last one may grow
+  std::vector<ChunkPart> parts_;          // the last one may grow
   std::vector<Chunk> chunks_;
   std::uint64_t firstChunks_ = 0;  // chunks at the file's start that are written
   std::uint64_t writtenEnd_;       // their end in the file

@@ -163,7 +163,7 @@ namespace {
 /// A ray's samples that some blocks own, and the scalars along it.
 class SampledRay {
  public:
-  struct Piece {
+  struct OwnedSamples {
     SampleRange range;
     const Block* block;
   };
@@ -174,14 +174,14 @@ class SampledRay {
       if (block.owned.empty()) continue;
       SampleRange range = samplesIn(ownedBox(inputs.scene, block), ray_, inputs.lattice.count);
       range = {std::max(range.first, scene_.samples.first), std::min(range.last, scene_.samples.last)};
-      if (range.first < range.last) pieces_.push_back({range, &block});
+      if (range.first < range.last) owned_.push_back({range, &block});
     }
-    std::sort(pieces_.begin(), pieces_.end(),
-              [](const Piece& a, const Piece& b) { return a.range.first < b.range.first; });
+    std::sort(owned_.begin(), owned_.end(),
+              [](const OwnedSamples& a, const OwnedSamples& b) { return a.range.first < b.range.first; });
   }
 
   /// Front to back.
-  const std::vector<Piece>& pieces() const { return pieces_; }
+  const std::vector<OwnedSamples>& owned() const { return owned_; }
   const SampleRange& inScene() const { return scene_.samples; }
   float frontOf(std::uint32_t k) const {
     return k == scene_.samples.first ? scene_.enter : static_cast<float>(inputs_.lattice.frontOf(k));
@@ -217,7 +217,7 @@ class SampledRay {
   const RayInputs& inputs_;
   SceneRay ray_;
   SceneStretch scene_;
-  std::vector<Piece> pieces_;
+  std::vector<OwnedSamples> owned_;
 };
 
 /// A sample's premultiplied colour, and its optical depth.
@@ -259,13 +259,13 @@ std::vector<Interval> castRay(const RayInputs& inputs, std::span<const Block> bl
   const bool isosurfaces = inputs.settings.blending.mode == BlendMode::Isosurface;
   std::vector<Interval> samples;
   float total = 0.0F;
-  for (const SampledRay::Piece& piece : ray.pieces()) {
-    const std::uint32_t first = (piece.range.first + atOnce - 1) / atOnce * atOnce;
-    for (std::uint32_t k = first; k < piece.range.last; k += atOnce) {
+  for (const SampledRay::OwnedSamples& owned : ray.owned()) {
+    const std::uint32_t first = (owned.range.first + atOnce - 1) / atOnce * atOnce;
+    for (std::uint32_t k = first; k < owned.range.last; k += atOnce) {
       const float front = ray.frontOf(k);
       const float back = ray.backOf(std::min(k + atOnce, ray.inScene().last));
-      const Material material = isosurfaces ? isosurfaceMaterial(inputs, ray, k, *piece.block)
-                                            : slabMaterial(inputs, ray, k, *piece.block, back - front);
+      const Material material = isosurfaces ? isosurfaceMaterial(inputs, ray, k, *owned.block)
+                                            : slabMaterial(inputs, ray, k, *owned.block, back - front);
       const glm::vec3& color = material.color;
       samples.push_back({front, back, color.r, color.g, color.b, material.opticalDepth});
       total += material.opticalDepth;
@@ -279,10 +279,10 @@ std::optional<Projection::Extreme> projectRay(const RayInputs& inputs, std::span
                                               int y) {
   const SampledRay ray(inputs, blocks, x, y);
   Projection projection(inputs.settings.blending.mode);
-  for (const SampledRay::Piece& piece : ray.pieces()) {
-    for (std::uint32_t k = piece.range.first; k < piece.range.last; ++k) {
+  for (const SampledRay::OwnedSamples& owned : ray.owned()) {
+    for (std::uint32_t k = owned.range.first; k < owned.range.last; ++k) {
       for (const float place : {ray.beginOf(k), ray.endOf(k)})
-        projection.add(ray.positionAt(place, *piece.block), ray.depthAt(place));
+        projection.add(ray.positionAt(place, *owned.block), ray.depthAt(place));
     }
   }
   return projection.extreme();

@@ -149,11 +149,11 @@ bool Outbox::begin(Clock::time_point now, std::optional<Clock::time_point>& retr
   return true;
 }
 
-Outbox::Part Outbox::take(Clock::time_point now) {
+Outbox::LevelPart Outbox::take(Clock::time_point now) {
   const std::uint32_t level = nextLevel_ - 1;
   const std::span<const std::byte> all(current_->levels[level]->bytes);
   const std::size_t count = std::min<std::size_t>(chunkBytes, all.size() - offset_);
-  Part part{current_, level, offset_, all.subspan(offset_, count)};
+  LevelPart part{current_, level, offset_, all.subspan(offset_, count)};
   offset_ += count;
   underWay_ += count;
   sent_.push_back({current_->id, level, offset_, count, now, delivered_});

@@ -28,14 +28,14 @@ class Outbox {
   void pause(bool paused) { isPaused_ = paused; }
 
   /// A part of a level; at offset 0 the level begins.
-  struct Part {
+  struct LevelPart {
     FramePtr frame;
     std::uint32_t level = 0;
     std::uint64_t offset = 0;
     std::span<const std::byte> bytes;  // of the frame; at most chunkBytes
   };
   struct Next {
-    std::optional<Part> part;                // to be sent now
+    std::optional<LevelPart> part;           // to be sent now
     std::optional<Clock::time_point> retry;  // without a part: when to ask again, if nothing happens before
   };
   /// Decides what to send now. The returned part counts as sent.
@@ -76,7 +76,7 @@ class Outbox {
   std::uint32_t firstLevelFor(const Frame& frame) const;
   bool isWorthBeginning(std::uint64_t bytes, Clock::time_point now,
                         std::optional<Clock::time_point>& retry) const;
-  Part take(Clock::time_point now);
+  LevelPart take(Clock::time_point now);
   void release();
 
   double cap_;

@@ -292,7 +292,7 @@ std::optional<std::string> Viewer::news() {
   return std::nullopt;
 }
 
-std::string Viewer::announcement(const Outbox::Part& part, Clock::time_point now) const {
+std::string Viewer::announcement(const Outbox::LevelPart& part, Clock::time_point now) const {
   const Frame& frame = *part.frame;
   const EncodedLevel& level = *frame.levels[part.level];
   return textOf(Level{frame.id, part.level, frame.levelCount, level.bytes.size(), level.width, level.height,
@@ -308,7 +308,7 @@ Viewer::Outgoing Viewer::next(Clock::time_point now) {
   }
   if (!isWelcome_) return Wait{};
   if (std::optional<std::string> text = news()) return *std::move(text);
-  std::optional<Outbox::Part> part = std::exchange(announced_, std::nullopt);
+  std::optional<Outbox::LevelPart> part = std::exchange(announced_, std::nullopt);
   if (!part) {
     Outbox::Next ahead = outbox_.next(now);
     if (!ahead.part) return Wait{ahead.retry};

@@ -130,7 +130,7 @@ class Viewer {
   void steer(const Wish& wish);
   void deny(std::string cause);
   std::optional<std::string> news();
-  std::string announcement(const Outbox::Part& part, Clock::time_point now) const;
+  std::string announcement(const Outbox::LevelPart& part, Clock::time_point now) const;
   friend class Hub;
   void offer(const FramePtr& frame, Clock::time_point now);
   std::vector<std::shared_ptr<const EncodedLevel>> held() const;
@@ -147,7 +147,7 @@ class Viewer {
   std::uint32_t number_ = 0;  // from 1 in each session
   std::optional<std::uint64_t> steeringSent_;
   std::optional<Denied> denied_;
-  std::optional<Outbox::Part> announced_;
+  std::optional<Outbox::LevelPart> announced_;
   std::weak_ptr<const EncodedLevel> inFlight_;  // of the binary message given out last
   std::optional<Farewell> farewell_;
   bool isCauseTold_ = false;
