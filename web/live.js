@@ -69,6 +69,10 @@ export class Live {
     this.state = "connecting";
     /** The reason for being lost or refused, in one line. */
     this.cause = "";
+    /** Whether this connection's server has been live. A finished series never is. */
+    this.hasBeenLive = false;
+    /** Whether the run has ended. It stays so while the page looks for another one. */
+    this.hasEnded = false;
     this.isPaused = false;
     /** Whether this connection's server has been told of the pause. */
     this.isServerPaused = false;
@@ -225,6 +229,8 @@ export class Live {
       this.change(this.state, this.cause);
     } else if (message.type === "state") {
       this.viewers = message.viewers;
+      if (message.state !== "ended") this.hasBeenLive = true;
+      this.hasEnded = message.state === "ended" && this.hasBeenLive;
       this.change(message.state, "");
     } else if (message.type === "steering") {
       this.steering = message;
@@ -257,6 +263,7 @@ export class Live {
     this.isServerPaused = false;
     this.series = welcome.series;
     this.viewers = welcome.viewers;
+    this.hasBeenLive = this.hasEnded = false;
     this.change("waiting", "");
     this.askForWanted();
     this.pauseServer();

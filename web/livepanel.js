@@ -53,6 +53,14 @@ function ageText(seconds) {
 }
 
 /**
+ * Whether the run has ended in order and its server is gone. The page looks for another one.
+ * @param {Live} live
+ */
+function isGone(live) {
+  return live.hasEnded && (live.state === "lost" || live.state === "connecting");
+}
+
+/**
  * The state of a connection in one line.
  * @param {Live} live
  * @param {number} now milliseconds
@@ -63,9 +71,10 @@ export function liveText(live, now) {
                  refused: "Refused", closed: "Off"};
   const isOn = state === "live" || state === "waiting" || state === "ended";
   const isSeries = live.series !== null && state === "ended";
-  const parts = [isOn && live.isPaused ? "Paused" : isSeries ? "Series" : words[state]];
-  if (state === "lost") parts.push(live.cause, `next attempt in ${Math.max(Math.ceil((live.retryAt - now) / 1000), 0)} s`);
-  else if (live.cause) parts.push(live.cause);
+  const isOver = isGone(live);
+  const parts = [isOn && live.isPaused ? "Paused" : isSeries ? "Series" : isOver ? "Ended" : words[state]];
+  if (state === "lost" && !isOver) parts.push(live.cause, `next attempt in ${Math.max(Math.ceil((live.retryAt - now) / 1000), 0)} s`);
+  else if (live.cause && !isOver) parts.push(live.cause);
   if (live.steering?.paused) parts.push("the simulation is paused");
   if (shown) {
     if (live.series && live.wanted !== null) parts.push(`frame ${shown.frame + 1} of ${live.series.steps.length}`);
@@ -207,7 +216,7 @@ export class LivePanel {
 
   refresh() {
     const {live} = this;
-    byId("live").dataset.state = live.isPaused && live.state === "live" ? "paused" : live.state;
+    byId("live").dataset.state = live.isPaused && live.state === "live" ? "paused" : isGone(live) ? "ended" : live.state;
     byId("livetext").textContent = liveText(live, performance.now());
     byId("pause").textContent = this.label();
     byId("pause").hidden = live.state === "ended" && !live.isPaused;

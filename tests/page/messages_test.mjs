@@ -420,6 +420,41 @@ function panelOf() {
   return {panel, live: panel.live, sockets};
 }
 
+/** The line and the light of a run that lives, ends in order, and is followed by another one. */
+async function testEndedRun() {
+  const {panel, live, sockets} = panelOf();
+  sockets[0].open();
+  sockets[0].text({...welcome, series: null});
+  sockets[0].text({type: "state", state: "live", viewers: 1});
+  sendLevel(sockets[0], 4, 0, 7);
+  await soon(20);
+  const line = liveText(live, performance.now());
+  for (const [what, word] of [["state", "Live"], ["step", "step "], ["age", "s old"], ["level", "level 1 of 2"], ["rate", "MiB/s"]])
+    check(line.includes(word), `the line of a live run has the ${what}: ${line}`);
+  const light = () => document.getElementById("live")?.dataset.state;
+  sockets[0].text({type: "state", state: "ended", viewers: 1});
+  sockets[0].end(1001);
+  check(liveText(live, 0).startsWith("Ended") && light() === "ended", `a run that has ended in order: ${liveText(live, 0)}, ${light()}`);
+  check(panel.label() === "Connect", "the button looks for another run at once");
+  await soon(700);
+  check(sockets.length === 2 && light() === "ended", `the page looks for another run: ${sockets.length}, ${light()}`);
+  sockets[1].open();
+  sockets[1].text({...welcome, series: null, session: "other"});
+  check(liveText(live, 0).startsWith("Waiting"), `another run is there: ${liveText(live, 0)}`);
+  sockets[1].end(1006);
+  check(liveText(live, 0).startsWith("Not connected") && light() === "lost", `a run that is cut off: ${liveText(live, 0)}, ${light()}`);
+  live.close();
+
+  // A finished series whose server goes can't be played any more.
+  const series = panelOf();
+  series.sockets[0].open();
+  series.sockets[0].text(welcome);
+  series.sockets[0].text({type: "state", state: "ended", viewers: 1});
+  series.sockets[0].end(1001);
+  check(series.live.state === "lost" && !series.live.hasEnded, "a series whose server is gone isn't connected");
+  series.live.close();
+}
+
 /** What a request for a frame of a series comes to: it ends, whatever becomes of the frame. */
 async function testMissingFrames() {
   const {panel, live, sockets} = panelOf();
@@ -496,6 +531,7 @@ await testConnection();
 await testLateDecoder();
 await testSeries();
 await testPause();
+await testEndedRun();
 await testMissingFrames();
 check(Math.abs(rateOf(10000, [{at: 8000, bytes: 1000}, {at: 9000, bytes: 3000}, {at: 1000, bytes: 1e9}]) - 2000) < 1, "the rate");
 console.log(failures === 0 ? "all well" : `${failures} failures`);
