@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "catalyst_adaptor/EngineFunctions.h"
 #include "catalyst_adaptor/ProcessState.h"
@@ -35,6 +36,13 @@ static vdi_engine* json_run;
 /* The JSON run's handle until it is finalized. All other handles belong to the run of scripts, whose engine
  * knows its own. */
 static const vdi_catalyst* json_handle;
+/* The process that initialised first; 0: none has. A child that it forks has copies of its MPI connections, its
+ * stream's sockets and its device, which don't work there, so no call reaches an engine. */
+static pid_t owner;
+
+static int is_forked(void) {
+  return owner != 0 && owner != getpid();
+}
 
 /* Returns 0 if this library's own path is unknown or too long. */
 static int engine_path(const char* file, char path[PATH_SIZE]) {
@@ -158,6 +166,11 @@ static int initialize(int32_t communicator, const vdi_given* given, vdi_engine**
                       vdi_catalyst** catalyst) {
   if (catalyst == NULL) return VDI_CATALYST_BAD_ARGUMENT;
   *catalyst = NULL;
+  if (is_forked()) {
+    fprintf(stderr, "vdi_catalyst: a process forked after vdi_catalyst_initialize can't call it again\n");
+    return VDI_CATALYST_BAD_ARGUMENT;
+  }
+  owner = getpid();
   vdi_process_state state;
   vdi_process_state_save(&state);
   const int code = initialize_some(communicator, given, run, catalyst);
@@ -192,7 +205,7 @@ int vdi_catalyst_go_on_with_json(int32_t fortran_communicator, const char* json,
 static const vdi_engine* engine_of(const vdi_catalyst* catalyst) {
   int over = 0;
   MPI_Finalized(&over);
-  if (over || catalyst == NULL) return NULL;
+  if (over || catalyst == NULL || is_forked()) return NULL;
   return catalyst == json_handle ? json_run : script_run;
 }
 
@@ -332,6 +345,7 @@ int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, const char* name, int
 }
 
 int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
+  if (catalyst != NULL && is_forked()) return VDI_CATALYST_OK; /* it ends in the process that began it */
   int over = 0;
   MPI_Finalized(&over);
   if (over && catalyst != NULL && (script_run != NULL || json_run != NULL))

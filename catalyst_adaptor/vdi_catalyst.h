@@ -283,7 +283,8 @@ VDI_CATALYST_API int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, cons
 
 /* Ends the scripts and the engine, and frees `catalyst`. A second call only returns
  * VDI_CATALYST_BAD_ARGUMENT. After MPI_Finalize this and all other functions do so, too, and this one prints
- * a message. */
+ * a message. In a process that the simulation forks, this one does nothing and returns 0, and the others return
+ * VDI_CATALYST_BAD_ARGUMENT: a run belongs to the process that began it. */
 VDI_CATALYST_API int vdi_catalyst_finalize(vdi_catalyst* catalyst);
 
 /* The text of the last error on this rank; "" if there was none. It is valid until the next call. */

@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 import pv_vdi
-from pv_vdi.catalyst import ENGINE, SCRIPT, Block, Catalyst, CatalystError
+from pv_vdi.catalyst import BAD_ARGUMENT, ENGINE, SCRIPT, Block, Catalyst, CatalystError
 
 N = 16
 FOLDER = os.environ["VDI_OUTPUT"]
@@ -52,6 +52,24 @@ def shown(positions, weights, lengths, density):
     return pv_vdi.read("particles_0.vdi")
 
 
+def end_in_a_child(catalyst):
+    """A forked child leaves the run alone, whatever it calls."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            refused(BAD_ARGUMENT, json={"field": "V"})
+            try:
+                catalyst.execute(20, 2.0)
+            except CatalystError as error:
+                catalyst.close()
+                code = 0 if error.code == BAD_ARGUMENT else 2
+        finally:
+            os._exit(code)
+    assert os.waitpid(child, 0)[1] == 0
+    assert os.path.exists("link"), "the child has ended the stream"
+
+
 def check_kept():
     """Arrays live until others of the same name and the same kind, cells or points, take their place."""
     with Catalyst(MPI.COMM_WORLD, json={"field": "V"}) as catalyst:
@@ -87,6 +105,7 @@ with Catalyst(MPI.COMM_WORLD, json=run) as catalyst:
         catalyst.execute(step, 0.1 * step)
     refused(ENGINE, json=run)
     refused_particles(catalyst)
+    end_in_a_child(catalyst)
     link = open("link").read().strip()
     assert os.stat("link").st_mode & 0o777 == 0o600
     # Not one of the ranks.
