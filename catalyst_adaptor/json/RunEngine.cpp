@@ -88,7 +88,11 @@ struct RunEngine::LoadedFrame {
 
 struct RunEngine::State {
   State(int handle, comm::Communicator own, const config::Run& run)
-      : fortranCommunicator(handle), comm(std::move(own)), schedule(run), budget(run.maxShare) {
+      : fortranCommunicator(handle),
+        comm(std::move(own)),
+        mostDeviceBytes(static_cast<std::uint64_t>(run.maxDeviceMiB.value_or(0)) << 20),
+        schedule(run),
+        budget(run.maxShare) {
     if (run.when) measure.emplace(*run.when);
   }
 
@@ -97,7 +101,9 @@ struct RunEngine::State {
     generator.reset();
     std::unique_ptr<Deposits> fresh;
     comm.together([&] {
-      device = gpu::Device::create(gpu::requestFromEnvironment(comm.localRank()));
+      gpu::DeviceRequest request = gpu::requestFromEnvironment(comm.localRank());
+      request.mostBytes = mostDeviceBytes;
+      device = gpu::Device::create(request);
       fresh = std::make_unique<Deposits>(device, comm);
       if (deposits) fresh->continueTelling(*deposits);
     });
@@ -112,6 +118,7 @@ struct RunEngine::State {
 
   int fortranCommunicator;
   comm::Communicator comm;
+  std::uint64_t mostDeviceBytes;  // 0: as many as the driver allows
   Clock::time_point begin = Clock::now();
   std::shared_ptr<gpu::Device> device;
   std::optional<VdiGenerator> generator;

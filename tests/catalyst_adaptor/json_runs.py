@@ -170,6 +170,16 @@ def budget():
     assert "2 left out" in log.stdout and "aren't records" not in log.stderr and "2 left out" in open("run.svg").read()
     run({"max_share": 1, "existing": "continue"}, 0, 0, 0)
     assert len(made()) == 3
+    # Less device memory makes more bands, and the same VDI.
+    large = {"resolution": [640, 360], "supersegments": 40}
+    run({**large, "output": "free_{timestep}.vdi", "log": "free.jsonl"}, 0)
+    free = events("free.jsonl")[1]["device_bytes"]
+    most = free * 3 // 4 >> 20
+    run({**large, "output": "less_{timestep}.vdi", "log": "less.jsonl", "max_device_mib": most}, 0)
+    less = events("less.jsonl")[1]["device_bytes"]
+    assert less <= most << 20 < free, (less, most, free)
+    assert open("less_0.vdi", "rb").read() == open("free_0.vdi", "rb").read()
+    run({"output": "none_{timestep}.vdi", "max_device_mib": 1}, 3, said="MiB of the allowed 1 MiB are held here")
 
 
 def full():

@@ -158,7 +158,7 @@ TEST_CASE("everything at once") {
     "resolution": [320, 200], "supersegments": 12, "margin": 0.5, "sampling_rate": 2, "shade": true,
     "output": {"vdi": "a/{timestep}.vdi", "png": "b_{timestep:03d}.png", "cinema": "c.cdb", "latest": true},
     "when": {"mean": "p", "association": "cells", "component": 1, "above": -1, "below": 2},
-    "max_share": 0.05, "existing": "continue", "isolation": {"restart": true, "patience": 20},
+    "max_share": 0.05, "max_device_mib": 512, "existing": "continue", "isolation": {"restart": true, "patience": 20},
     "log": {"json": "run.jsonl", "text": "run.log"},
     "stream": {"host": "::1", "port": 8080, "token_file": "t", "link_file": "l", "certificate": "c", "key": "k",
                "megabits": 100, "steer": true, "steering_log": "s"}})",
@@ -190,6 +190,7 @@ TEST_CASE("everything at once") {
   CHECK_FALSE(run.when->holds(-1.0));
   CHECK_FALSE(run.when->holds(2.0));
   CHECK(run.maxShare == 0.05);
+  CHECK(run.maxDeviceMiB == 512);
   CHECK(run.existing == config::Existing::Continue);
   CHECK(run.isolation->restart);
   CHECK(run.isolation->patience == 20.0);
@@ -239,6 +240,7 @@ TEST_CASE("mistakes are told with their place") {
   refusedField(R"("when": {"max": "V", "above": 1, "association": "faces"})", "/when/association");
   refusedField(R"("max_share": 1.5)", "/max_share: is a share, 1 at most");
   refusedField(R"("max_share": 0)", "/max_share: must be > 0");
+  refusedField(R"("max_device_mib": 0)", "/max_device_mib");
   refusedField(R"("existing": "append")", "/existing: must be 'refuse', 'overwrite' or 'continue'");
   refusedField(R"("existing": true)", "/existing: must be a string");
   refusedField(R"("isolation": "thread")", "/isolation: must be 'process', or an object");

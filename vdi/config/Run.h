@@ -102,7 +102,8 @@ struct Run {
   std::optional<double> everyTime;     // period in the simulation's time
   std::optional<double> everySeconds;  // period in seconds of the wall clock
   std::optional<RunCondition> when;
-  std::optional<double> maxShare;  // share of the run's wall time that frames may take
+  std::optional<double> maxShare;            // share of the run's wall time that frames may take
+  std::optional<std::int64_t> maxDeviceMiB;  // device memory that a rank may hold
   Existing existing = Existing::Refuse;
   std::vector<RunCamera> cameras{{}};  // at least one; the first is the stream's
   RunColors colors;

@@ -258,6 +258,9 @@ void readTriggers(const JsonValue& document, Run& run) {
     run.maxShare = positiveOf(value);
     if (*run.maxShare > 1.0) value.fail("is a share, 1 at most");
   });
+  constexpr std::int64_t mostMebibytes = std::int64_t{1} << 24;  // 16 TiB
+  ifThere(document, "max_device_mib",
+          [&](const JsonValue& value) { run.maxDeviceMiB = value.whole(1, mostMebibytes); });
 }
 
 Existing existingOf(const JsonValue& value) {
@@ -459,9 +462,9 @@ namespace {
 /// The fields of the whole document.
 std::vector<std::string> documentFields() {
   std::vector<std::string> fields{"$schema",    "field",         "association", "component", "every",
-                                  "every_time", "every_seconds", "when",        "max_share", "existing",
-                                  "camera",     "cameras",       "orbit",       "colors",    "resolution",
-                                  "output",     "stream",        "log",         "isolation"};
+                                  "every_time", "every_seconds", "when",        "max_share", "max_device_mib",
+                                  "existing",   "camera",        "cameras",     "orbit",     "colors",
+                                  "resolution", "output",        "stream",      "log",       "isolation"};
   for (const Setting& setting : settingsTable()) fields.emplace_back(setting.key);
   return fields;
 }

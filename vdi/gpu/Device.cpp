@@ -18,9 +18,14 @@ DeviceCandidate choose(const Instance& instance, const DeviceRequest& request) {
   const std::vector<DeviceCandidate> candidates = instance.candidates();
   DeviceCandidate chosen = candidates[chooseDevice(summariesOf(candidates), request)];
   if (!request.importsHostMemory) chosen.limits.hostPointerAlignment = 0;
+  DeviceLimits& limits = chosen.limits;
+  limits.mostBytes = request.mostBytes;
+  if (request.mostBytes > 0) {
+    limits.memoryBytes = std::min(limits.memoryBytes, request.mostBytes);
+    limits.maxAllocationBytes = std::min(limits.maxAllocationBytes, request.mostBytes);
+  }
   if (request.maxImageDimension3D > 0) {
-    chosen.limits.maxImageDimension3D =
-        std::min(chosen.limits.maxImageDimension3D, request.maxImageDimension3D);
+    limits.maxImageDimension3D = std::min(limits.maxImageDimension3D, request.maxImageDimension3D);
   }
   return chosen;
 }

@@ -18,6 +18,8 @@ struct DeviceRequest {
   bool gpuPrograms = false;
   /// A limit below the device's own, to test cutting into pieces; 0: the device's.
   std::uint32_t maxImageDimension3D = 0;
+  /// The most bytes that the device's buffers and images may hold together; 0: as many as the driver allows.
+  std::uint64_t mostBytes = 0;
   /// False: behaves as a device that cannot import the process's memory, to test the alternative.
   bool importsHostMemory = true;
   /// The folder that keeps compiled shaders from run to run; empty: none does.

@@ -24,12 +24,14 @@ double mebibytes(std::uint64_t bytes) {
 
 /// Names the figures that a user needs to make the problem fit.
 [[noreturn]] void throwOutOfMemory(const Device& device, std::uint64_t bytes, const char* what) {
+  const DeviceLimits& limits = device.limits();
   throw Error(
       ErrorCode::OutOfMemory,
-      fmt::format("no room for a {} of {:.1f} MiB: {:.1f} MiB of the device's {:.0f} MiB are held here, "
-                  "and one allocation may have up to {:.0f} MiB",
+      fmt::format("no room for a {} of {:.1f} MiB: {:.1f} MiB of the {} {:.0f} MiB are held here, and one "
+                  "allocation may have up to {:.0f} MiB",
                   what, mebibytes(bytes), mebibytes(device.allocatedBytes()),
-                  mebibytes(device.limits().memoryBytes), mebibytes(device.limits().maxAllocationBytes)),
+                  limits.mostBytes > 0 ? "allowed" : "device's", mebibytes(limits.memoryBytes),
+                  mebibytes(limits.maxAllocationBytes)),
       device.name());
 }
 
@@ -42,6 +44,8 @@ void requireRoom(VkResult result, const char* call, const Device& device, std::u
 
 VkDeviceMemory allocate(Device& device, const VkMemoryRequirements& needs, std::uint32_t type,
                         const void* chain, const char* what) {
+  const std::uint64_t most = device.limits().mostBytes;
+  if (most > 0 && device.allocatedBytes() + needs.size > most) throwOutOfMemory(device, needs.size, what);
   const VkMemoryAllocateInfo info{VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, chain, needs.size, type};
   VkDeviceMemory memory = VK_NULL_HANDLE;
   requireRoom(vkAllocateMemory(device.vulkan().handle(), &info, nullptr, &memory), "vkAllocateMemory", device,

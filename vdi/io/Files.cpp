@@ -11,6 +11,7 @@
 #include <array>
 #include <cassert>
 #include <cerrno>
+#include <cstdio>
 #include <csignal>
 #include <optional>
 #include <random>
@@ -384,6 +385,14 @@ void writeAtomically(const fs::path& path, std::span<const std::byte> bytes) {
   OutputFile file(path);
   file.write(0, bytes);
   file.commit();
+}
+
+void appendLine(const fs::path& path, std::string_view line) {
+  std::FILE* const file = std::fopen(path.c_str(), "ae");
+  bool isWritten = file != nullptr && std::fwrite(line.data(), 1, line.size(), file) == line.size() &&
+                   std::fputc('\n', file) != EOF;
+  if (file != nullptr && std::fclose(file) != 0) isWritten = false;
+  if (!isWritten) fail("append a line", errno, path);
 }
 
 void replaceLink(const fs::path& link, const fs::path& target) {

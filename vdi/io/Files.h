@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 namespace vdi::io {
@@ -101,6 +102,9 @@ class SharedOutput {
   std::filesystem::path path_;
   int descriptor_;
 };
+
+/// Appends `line` and a line end to a file, which it creates. Throws Error{Io} with the file as context.
+void appendLine(const std::filesystem::path& path, std::string_view line);
 
 /// Makes `link` a symbolic link to `target`, which is relative to the link's folder. Readers see the old link
 /// or the new one. Throws Error{Io} with the link as context. Never replaces anything but a link.
