@@ -1,20 +1,24 @@
 #include "catalyst_adaptor/isolated/IsolatedRun.h"
 
 #include <dlfcn.h>
+#include <fmt/format.h>
 #include <mpi.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <limits>
-#include <map>
 #include <new>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
+
+#include "vdi/io/Files.h"
 
 namespace vdi::catalyst {
 
@@ -195,35 +199,53 @@ void IsolatedRun::end() {
   job_.reset();
 }
 
-/// Takes the result of one step. Returns the worse code.
-int IsolatedRun::take(const DoneNotice& notice, int worst) {
-  std::map<std::string, double> values;
-  for (std::size_t i = 0; i < notice.parameters.size(); ++i)
-    values[parameters_.all()[i].name] = notice.parameters[i];
+/// Takes the result of one step, and notes the parameters that have changed. Returns the worse code.
+int IsolatedRun::take(const DoneNotice& notice, int worst, Values& changes) {
+  Values values;
+  for (std::size_t i = 0; i < notice.parameters.size(); ++i) {
+    const Parameter& parameter = parameters_.all()[i];
+    if (parameter.value == notice.parameters[i]) continue;
+    values[parameter.name] = changes[parameter.name] = notice.parameters[i];
+  }
   parameters_.set(values);
   if (notice.code < worst || notice.code == VDI_CATALYST_OK) return worst;
   self_.error = notice.text;
   return notice.code;
 }
 
-/// Collective: takes the results of steps up to the given number, which all ranks have. Returns the worst
-/// code.
-int IsolatedRun::settle(std::int64_t done) {
+/// Collective: takes the results of steps up to the given number, which all ranks have. The parameters in
+/// them are in force after the simulation's step `at`. Returns the worst code.
+int IsolatedRun::settle(std::int64_t done, std::optional<At> at) {
   if (settled_ == done) return VDI_CATALYST_OK;
   int worst = VDI_CATALYST_OK;
+  Values changes;
   std::exception_ptr failure;
   for (; settled_ < done; ++settled_) {
     const DoneNotice notice = process_->takeDone();
     try {
-      worst = take(notice, worst);
+      worst = take(notice, worst, changes);
     } catch (const std::bad_alloc&) {
       failure = std::current_exception();
     }
   }
   const int code = guarded(self_, VDI_CATALYST_ENGINE, [&] {
     if (failure) std::rethrow_exception(failure);
+    if (rank_ == 0 && at && !changes.empty()) tell(changes, *at);
   });
   return std::max(worst, code);
+}
+
+/// Reports when parameters come into force. The process that makes frames has logged when viewers set them,
+/// but the simulation has gone on meanwhile.
+void IsolatedRun::tell(const Values& changes, const At& at) const {
+  for (const auto& [name, value] : changes)
+    fmt::print(stderr, "vdi_catalyst: step {}: {} = {:g} from now on\n", at.step, name, value);
+  const bool isLogged = options_.run && options_.run->stream && !options_.run->stream->steeringLog.empty();
+  if (!isLogged) return;
+  nlohmann::ordered_json entry{{"step", at.step}};
+  entry["time"] = std::isfinite(at.time) ? nlohmann::ordered_json(at.time) : nlohmann::ordered_json();
+  entry["in_force"] = changes;
+  io::appendLine(options_.run->stream->steeringLog, entry.dump());
 }
 
 bool IsolatedRun::isLocallyWanted(std::int64_t step, double time, double now) const {
@@ -285,7 +307,7 @@ int IsolatedRun::execute(std::int64_t step, double time) {
     code = bury(step);
     if (!options_.isolation.restart) return code;
   } else if (process_) {
-    code = settle(-behind);
+    code = settle(-behind, At{step, time});
   }
   if (wanted != 0) {
     if (schedule_ && !isSteered()) schedule_->begin(time, now);
@@ -312,7 +334,7 @@ int IsolatedRun::handOver(std::int64_t step, double time, double now) {
       const int code = bury(step);
       return options_.isolation.restart ? std::max(code, handOver(step, time, now)) : code;
     }
-    earlier = settle(done);
+    earlier = settle(done, At{step, time});
     if (result == Wait::Tired) {
       tiredAt_ = settled_;
       return leaveOut(step);
@@ -411,7 +433,7 @@ int IsolatedRun::finish() {
     end();
     return code;
   }
-  int code = settle(handedOver_);
+  int code = settle(handedOver_, std::nullopt);
   if (process_->finished()->code > code) {
     const int ended = process_->finished()->code;
     code = std::max(ended,

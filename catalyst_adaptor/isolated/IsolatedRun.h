@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -58,8 +59,15 @@ class IsolatedRun {
   int awaitStart();
   int bury(std::optional<std::int64_t> step);
   void end();
-  int take(const DoneNotice& notice, int worst);
-  int settle(std::int64_t done);
+  /// A step of the simulation and its time.
+  struct At {
+    std::int64_t step;
+    double time;
+  };
+  using Values = std::map<std::string, double>;
+  int take(const DoneNotice& notice, int worst, Values& changes);
+  int settle(std::int64_t done, std::optional<At> at);
+  void tell(const Values& changes, const At& at) const;
   template <typename Progress>
   std::pair<Wait, std::int64_t> wait(Progress progress, std::int64_t goal, double limit);
   bool isLocallyWanted(std::int64_t step, double time, double now) const;

@@ -3,15 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdio>
 #include <optional>
-#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "vdi/core/Error.h"
+#include "vdi/io/Files.h"
 
 namespace vdi::catalyst {
 
@@ -27,14 +26,6 @@ void rescale(std::vector<OpacityNode>& nodes, const std::array<double, 2>& range
   if (!(width > 0.0)) return;
   for (OpacityNode& node : nodes) node.x = range[0] + (range[1] - range[0]) * ((node.x - first) / width);
   nodes.back().x = range[1];
-}
-
-void appendLine(const std::string& path, const std::string& line) {
-  std::FILE* const file = std::fopen(path.c_str(), "ae");
-  bool isWritten = file != nullptr && std::fputs((line + "\n").c_str(), file) >= 0;
-  if (file != nullptr && std::fclose(file) != 0) isWritten = false;
-  if (isWritten) return;
-  throw Error(ErrorCode::Io, "can't write viewers' changes: " + std::system_category().message(errno), path);
 }
 
 }  // namespace
@@ -88,7 +79,7 @@ void RunSteering::tell(const stream::SteeringRequest& request, const std::string
              request.viewer);
   if (log.empty()) return;
   try {
-    appendLine(log, stream::logEntryOf(request, step, time));
+    io::appendLine(log, stream::logEntryOf(request, step, time));
   } catch (const Error&) {  // reported at the end, when no other rank waits for this one
     trouble_ = std::current_exception();
   }

@@ -10,10 +10,8 @@
 #include <vtkSMTransferFunctionProxy.h>
 
 #include <array>
-#include <cerrno>
 #include <chrono>
 #include <cstdio>
-#include <cstring>
 #include <map>
 #include <optional>
 #include <string_view>
@@ -24,6 +22,7 @@
 #include "VDIParameters.h"
 #include "VDISession.h"
 #include "vdi/core/Error.h"
+#include "vdi/io/Files.h"
 #include "vdi/stream/Steering.h"
 #include "vtkVDIStreamWriter.h"
 
@@ -139,11 +138,12 @@ vdi::stream::GeneratorControls ControlsOf(vtkSMProxy* generator) {
 /// Appends a line. Returns the reason if it fails, and "" otherwise.
 std::string Log(const std::string& path, const std::string& line) {
   if (path.empty()) return {};
-  std::FILE* const file = std::fopen(path.c_str(), "ae");
-  bool isWritten = file != nullptr && std::fputs((line + "\n").c_str(), file) >= 0;
-  if (file != nullptr && std::fclose(file) != 0) isWritten = false;
-  if (isWritten) return {};
-  return fmt::format("can't write viewers' changes to {}: {}", path, std::strerror(errno));
+  try {
+    vdi::io::appendLine(path, line);
+    return {};
+  } catch (const vdi::Error& error) {
+    return fmt::format("viewers' changes aren't logged: {}", error.what());
+  }
 }
 
 /// Returns the first rank's text on all ranks. Collective.
