@@ -135,6 +135,7 @@ def install(leave, plugin):
     global plugin_file
     plugin_file = plugin
     from paraview.catalyst import v2_internals
+    from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
     from vtkmodules.vtkCommonCore import vtkLogger
 
     skip = (__name__, "<string>", v2_internals.__file__, "<frozen importlib", importlib.__file__)
@@ -142,6 +143,8 @@ def install(leave, plugin):
     folders = {}  # folders of extracts, by module
     owners = {}  # modules' names, by extractor
     loading = {}
+    last_files = {}  # by extractor
+    told_of = set()  # extractors that replace an earlier run's files
 
     def hook(kind, error, trace):
         if kind is not ScriptFailed:
@@ -193,6 +196,7 @@ def install(leave, plugin):
         due = leave_out_same_files(due_extractors())
         if due:
             make_folder(folders.get(module.__name__, ""))
+            tell_of_older_files(due)
         drawn = [extractor for extractor in due if draws(extractor)]
         if leave(not all([has_display(extractor) for extractor in drawn])):
             set_enabled(drawn, False)
@@ -212,6 +216,21 @@ def install(leave, plugin):
                 set_enabled(same[1:], False)
                 disabled.extend(same[1:])
         return [extractor for same in writers.values() for extractor in same[:1]]
+
+    def tell_of_older_files(due):
+        """Tells, once for each extractor, that it replaces files of an earlier run."""
+        for extractor in due:
+            key, name = extractor.SMProxy.GetGlobalID(), extractor.Writer.FileName
+            try:
+                name = name.format(timestep=helper.GetTimeStep(), time=helper.GetTime())
+            except (IndexError, KeyError, ValueError):
+                continue  # it has fields that only its writer knows
+            file = os.path.join(folders.get(owners.get(extractor.SMProxy, ""), ""), name)
+            if key not in told_of and last_files.get(key) != file and os.path.isfile(file):
+                told_of.add(key)
+                vtkLogger.Log(vtkLogger.VERBOSITY_WARNING, "script", 0, "'%s' is an earlier run's file; this run replaces it and "
+                              "the others of its kind" % file)
+            last_files[key] = file
 
     def has_display(extractor):
         try:

@@ -29,6 +29,9 @@ if FAULT == "same file":
     other.Writer.FileName = "vdi_{timestep:06d}.vdi"
     other.Trigger.UseEndTimeStep = 1
     other.Trigger.EndTimeStep = 2
+if FAULT == "older files" and rank == 0:
+    for step in (2, 3):  # no fault: each is replaced, and one line says so
+        open(os.path.join(OUTPUT, "vdi_%06d.vdi" % step), "w").close()
 if FAULT == "picture":
     pictures = CreateExtractor("PNG", view, registrationName="png")
     pictures.Trigger.UseEndTimeStep = 1
