@@ -122,12 +122,9 @@ TEST_CASE("validation messages name the faulty object") {
 }
 
 TEST_CASE("a device compiles a shader once for each specialisation, whichever thread asks") {
-  ComputePipelineInfo info;
-  info.shader = "store";
-  info.pushConstantBytes = sizeof(shared::ReduceConstants);
   const auto own = Device::create(requestFromEnvironment(0));
   const auto handleOf = [&](std::uint32_t compact) {
-    ComputePipelineInfo special = info;
+    ComputePipelineInfo special = infoOf<shared::ReduceConstants>("store");
     special.specialization = {0, 0, compact, 0};
     return ComputePipeline(own, special).handle();  // outlives its user
   };

@@ -14,9 +14,7 @@ namespace vdi::gpu {
 namespace {
 
 ComputePipelineInfo castInfo() {
-  ComputePipelineInfo info;
-  info.shader = "cast";
-  info.pushConstantBytes = sizeof(shared::CastConstants);
+  ComputePipelineInfo info = infoOf<shared::CastConstants>("cast");
   info.imageCount = shared::castMaxPages;
   info.uniformBytes = sizeof(shared::CastParams);
   info.hasPlane = true;

@@ -10,9 +10,7 @@ namespace vdi::gpu {
 namespace {
 
 ComputePipelineInfo cellsInfo() {
-  ComputePipelineInfo info;
-  info.shader = "cells";
-  info.pushConstantBytes = sizeof(shared::CellsConstants);
+  ComputePipelineInfo info = infoOf<shared::CellsConstants>("cells");
   info.imageCount = shared::castMaxPages;
   return info;
 }

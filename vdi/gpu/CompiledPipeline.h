@@ -33,6 +33,15 @@ struct ComputePipelineInfo {
   std::vector<std::uint32_t> specialization;  // constant_id 0, 1, ... as raw 32-bit words
 };
 
+/// A shader with these push constants and nothing else.
+template <typename Constants>
+ComputePipelineInfo infoOf(std::string_view shader) {
+  ComputePipelineInfo info;
+  info.shader = shader;
+  info.pushConstantBytes = sizeof(Constants);
+  return info;
+}
+
 /// Bindings of set 0.
 constexpr std::uint32_t descriptorImages = 0;
 constexpr std::uint32_t descriptorUniforms = 1;

@@ -5,9 +5,7 @@ namespace vdi::gpu {
 namespace {
 
 ComputePipelineInfo compositeInfo() {
-  ComputePipelineInfo info;
-  info.shader = "composite";
-  info.pushConstantBytes = sizeof(shared::CompositeConstants);
+  ComputePipelineInfo info = infoOf<shared::CompositeConstants>("composite");
   info.uniformBytes = sizeof(shared::CompositeParams);
   return info;
 }

@@ -8,19 +8,14 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo depositInfo() {
-  ComputePipelineInfo info;
-  info.shader = "deposit";
-  info.pushConstantBytes = sizeof(shared::DepositConstants);
-  return info;
-}
-
 constexpr std::uint64_t sumBytes = sizeof(std::int64_t);
 
 }  // namespace
 
 DepositPass::DepositPass(std::shared_ptr<Device> device)
-    : device_(std::move(device)), pipeline_(device_, depositInfo()), commands_(device_) {}
+    : device_(std::move(device)),
+      pipeline_(device_, infoOf<shared::DepositConstants>("deposit")),
+      commands_(device_) {}
 
 void DepositPass::start(std::span<const glm::ivec3> blocks) {
   commands_.wait();

@@ -4,13 +4,6 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo expandInfo() {
-  ComputePipelineInfo info;
-  info.shader = "expand";
-  info.pushConstantBytes = sizeof(shared::ExpandConstants);
-  return info;
-}
-
 std::uint64_t tilesOf(const glm::ivec2& lists, int size) {
   const glm::ivec2 tiles = (lists + size - 1) / size;
   return static_cast<std::uint64_t>(tiles.x) * static_cast<std::uint64_t>(tiles.y);
@@ -31,7 +24,8 @@ std::uint64_t tileCount(const glm::ivec2& lists) {
   return tilesOf(lists, shared::renderTile) + tilesOf(lists, shared::renderLargeTile);
 }
 
-ExpandPass::ExpandPass(std::shared_ptr<Device> device) : pipelines_(std::move(device), expandInfo()) {}
+ExpandPass::ExpandPass(std::shared_ptr<Device> device)
+    : pipelines_(std::move(device), infoOf<shared::ExpandConstants>("expand")) {}
 
 void ExpandPass::record(Commands& commands, const shared::ExpandConstants& constants) {
   const std::uint64_t count = invocations(constants);

@@ -10,15 +10,8 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo reduceInfo(std::string_view shader) {
-  ComputePipelineInfo info;
-  info.shader = shader;
-  info.pushConstantBytes = sizeof(shared::ReduceConstants);
-  return info;
-}
-
 ComputePipelineInfo subgroupInfo() {
-  ComputePipelineInfo info = reduceInfo("reduce_subgroup");
+  ComputePipelineInfo info = infoOf<shared::ReduceConstants>("reduce_subgroup");
   info.wholeSubgroups = true;
   return info;
 }
@@ -44,10 +37,10 @@ ReducePass::ReducePass(const std::shared_ptr<Device>& device)
 ReducePass::ReducePass(std::shared_ptr<Device> device, Subgroups subgroups)
     : device_(std::move(device)),
       subgroups_(subgroups),
-      find_(device_, reduceInfo("long_lists")),
+      find_(device_, infoOf<shared::ReduceConstants>("long_lists")),
       subgroup_(device_, subgroupInfo()),
-      alone_(device_, reduceInfo("reduce")),
-      store_(device_, reduceInfo("store")),
+      alone_(device_, infoOf<shared::ReduceConstants>("reduce")),
+      store_(device_, infoOf<shared::ReduceConstants>("store")),
       longListCount_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal) {}
 
 void ReducePass::record(Commands& commands, shared::ReduceConstants constants, const MaxPerList& maxPerList) {

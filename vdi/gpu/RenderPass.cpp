@@ -13,9 +13,7 @@ namespace vdi::gpu {
 namespace {
 
 ComputePipelineInfo renderInfo(std::string_view shader) {
-  ComputePipelineInfo info;
-  info.shader = shader;
-  info.pushConstantBytes = sizeof(shared::RenderRays);
+  ComputePipelineInfo info = infoOf<shared::RenderRays>(shader);
   info.uniformBytes = sizeof(shared::RenderParams);
   return info;
 }

@@ -10,20 +10,13 @@ namespace vdi::gpu {
 
 namespace {
 
-ComputePipelineInfo scanInfo() {
-  ComputePipelineInfo info;
-  info.shader = "scan";
-  info.pushConstantBytes = sizeof(shared::ScanConstants);
-  return info;
-}
-
 constexpr std::uint32_t perGroup = shared::scanGroup * shared::scanPerThread;
 
 }  // namespace
 
 ScanPass::ScanPass(std::shared_ptr<Device> device)
     : device_(std::move(device)),
-      pipelines_(device_, scanInfo()),
+      pipelines_(device_, infoOf<shared::ScanConstants>("scan")),
       overflow_(device_, sizeof(std::uint32_t), MemoryKind::Readback) {}
 
 void ScanPass::recordBoth(Commands& commands, shared::ScanConstants constants, ComputePipeline& pipeline) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "shaders/shared/counts.h"
+
 namespace vdi::detail {
 
 using gpu::MemoryKind;
@@ -14,8 +16,8 @@ Compositor::Compositor(std::shared_ptr<gpu::Device> device)
       commands_(device_),
       flattens_(device_),
       scan_(device_),
-      counts_(device_),
-      interleavePass_(device_),
+      counts_(device_, gpu::infoOf<shared::CountsConstants>("counts")),
+      interleave_(device_, gpu::infoOf<shared::InterleaveConstants>("interleave")),
       compositePass_(device_),
       builder_(device_),
       histogram_(device_) {}
@@ -94,6 +96,13 @@ void Compositor::receive(const Distributed& parts) {
   transfers_.submit();
 }
 
+/// constants.mode is interleaveModeCount, then (after a scan) interleaveModeWrite, then interleaveModeFlatten
+/// for a picture.
+void Compositor::recordInterleave(gpu::Commands& commands, const shared::InterleaveConstants& constants) {
+  commands.dispatch(interleave_.with({0, 0, encodingOf(constants.form)}), constants,
+                    gpu::groupsFor(constants.listCount, shared::compositeGroup));
+}
+
 void Compositor::interleave(const Distributed& parts, const DepthCode& code, DeviceLists& interleaved,
                             const ListBuilder::Behind& behind) {
   finish();
@@ -120,7 +129,7 @@ void Compositor::interleave(const Distributed& parts, const DepthCode& code, Dev
   unpack.counts = subCounts_.address();
   unpack.words = static_cast<std::uint32_t>(ranks * rowWords);
   unpack.mode = shared::countsModeUnpack;
-  counts_.record(commands_, unpack);
+  if (unpack.words > 0) commands_.dispatchMany(counts_, unpack, unpack.words, shared::countsGroup);
   commands_.barrier();
   for (std::uint64_t r = 0; r < ranks; ++r) {
     if (!parts.subLists[r].wideCounts) continue;
@@ -145,10 +154,10 @@ void Compositor::interleave(const Distributed& parts, const DepthCode& code, Dev
   constants.form = storedForm(code);
   commands_.mark("merge");
   constants.mode = shared::interleaveModeCount;
-  if (lists > 0) interleavePass_.record(commands_, constants);
+  if (lists > 0) recordInterleave(commands_, constants);
   scan_.record(commands_, interleavedCounts_, interleaved.offsets, lists);
   constants.mode = shared::interleaveModeWrite;
-  if (lists > 0) interleavePass_.record(commands_, constants);
+  if (lists > 0) recordInterleave(commands_, constants);
   if (behind) behind(commands_);
   commands_.submit();
   last_ = commands_.last();
@@ -237,7 +246,7 @@ void Compositor::flatten(const DeviceLists& interleaved, const DepthCode& code, 
   constants.form = storedForm(code);
   flattens_.begin();
   flattens_.mark("flatten");
-  interleavePass_.record(flattens_, constants);
+  recordInterleave(flattens_, constants);
   flattens_.submit();
   flattening_ = true;
   last_ = flattens_.last();

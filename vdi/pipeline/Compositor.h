@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "vdi/gpu/CompositePass.h"
-#include "vdi/gpu/CountsPass.h"
-#include "vdi/gpu/InterleavePass.h"
+#include "vdi/gpu/ComputePipeline.h"
+#include "vdi/gpu/PipelineSet.h"
 #include "vdi/pipeline/Distributor.h"
 #include "vdi/pipeline/HistogramBuffer.h"
 #include "vdi/pipeline/ListBuilder.h"
@@ -56,6 +56,7 @@ class Compositor {
  private:
   void apply(const DeviceLists& interleaved, const Options& options);
   void receive(const Distributed& parts);
+  void recordInterleave(gpu::Commands& commands, const gpu::shared::InterleaveConstants& constants);
   void wait();
   void noteTimes();
   std::vector<HostAccess*> receivedFrom_;  // by the merge under way
@@ -69,8 +70,8 @@ class Compositor {
   gpu::Commands commands_;
   gpu::Commands flattens_;
   gpu::ScanPass scan_;
-  gpu::CountsPass counts_;
-  gpu::InterleavePass interleavePass_;
+  gpu::ComputePipeline counts_;  // unpacks the counts of the ranks' lists
+  gpu::PipelineSet interleave_;  // by precision: puts the ranks' supersegments of each list in order of depth
   gpu::CompositePass compositePass_;
   ListBuilder builder_;
   gpu::Buffer received_;

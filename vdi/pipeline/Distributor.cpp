@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "shaders/shared/counts.h"
+
 namespace vdi::detail {
 
 using gpu::MemoryKind;
@@ -47,7 +49,7 @@ Distributor::Distributor(std::shared_ptr<gpu::Device> device, const comm::Commun
       accesses_(device_),
       commands_(device_),
       transfers_(device_, gpu::QueueKind::Transfer),
-      counts_(device_),
+      counts_(device_, gpu::infoOf<shared::CountsConstants>("counts")),
       tooLarge_(device_, wordBytes, MemoryKind::Readback) {
   const auto ranks = static_cast<std::size_t>(comm.size());
   pieces_.reserve(ranks);
@@ -64,7 +66,7 @@ void Distributor::recordCounts(gpu::Commands& commands, const DeviceLists& lists
   constants.listCount = lists.listCount;
   constants.words = static_cast<std::uint32_t>(bytes / wordBytes);
   constants.mode = wide ? shared::countsModePackWide : shared::countsModePack;
-  counts_.record(commands, constants);
+  if (constants.words > 0) commands.dispatchMany(counts_, constants, constants.words, shared::countsGroup);
 }
 
 /// Packs all lists' counts in packed_, and the offset of each rank's supersegments in boundaryOffsets_.

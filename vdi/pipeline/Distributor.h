@@ -9,7 +9,7 @@
 #include "vdi/comm/Exchange.h"
 #include "vdi/comm/Ownership.h"
 #include "vdi/gpu/Commands.h"
-#include "vdi/gpu/CountsPass.h"
+#include "vdi/gpu/ComputePipeline.h"
 #include "vdi/gpu/Device.h"
 #include "vdi/pipeline/DeviceLists.h"
 #include "vdi/pipeline/HostAccess.h"
@@ -81,7 +81,7 @@ class Distributor {
   HostAccesses accesses_;
   gpu::Commands commands_;
   gpu::Commands transfers_;
-  gpu::CountsPass counts_;
+  gpu::ComputePipeline counts_;  // packs lists' counts for exchange between ranks
   gpu::Buffer packed_;
   gpu::Buffer tooLarge_;
   gpu::Buffer boundaryOffsets_;  // number of supersegments before each stretch, [stretches + 1]

@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "shaders/shared/interpolate.h"
 #include "vdi/core/BitCast.h"
 #include "vdi/core/Error.h"
 
@@ -19,7 +20,7 @@ ListBuilder::ListBuilder(std::shared_ptr<gpu::Device> device)
     : device_(std::move(device)),
       commands_(device_),
       scan_(device_),
-      interpolate_(device_),
+      interpolate_(device_, gpu::infoOf<shared::InterpolateConstants>("interpolate")),
       reduce_(device_),
       status_(device_, shared::statusWords * sizeof(std::uint32_t), MemoryKind::DeviceLocal),
       statusReadback_(device_, shared::statusWords * sizeof(std::uint32_t), MemoryKind::Readback),
@@ -215,7 +216,8 @@ void ListBuilder::recordSearch() {
     started_->record(commands_, targets, false);
     commands_.barrier();
   }
-  interpolate_.record(commands_, constants);
+  commands_.dispatch(interpolate_.with({constants.quotas != 0 ? 1U : 0U}), constants,
+                     gpu::groupsFor(constants.width, shared::interpolateGroup), constants.rows);
 }
 
 /// Writes pre-segments, and the number of supersegments to keep of them.

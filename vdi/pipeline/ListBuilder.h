@@ -15,8 +15,8 @@
 #include "vdi/core/GenerateSettings.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Device.h"
-#include "vdi/gpu/InterpolatePass.h"
 #include "vdi/gpu/Memory.h"
+#include "vdi/gpu/PipelineSet.h"
 #include "vdi/gpu/ReducePass.h"
 #include "vdi/gpu/ScanPass.h"
 #include "vdi/pipeline/DeviceLists.h"
@@ -152,7 +152,9 @@ class ListBuilder {
   std::shared_ptr<gpu::Device> device_;
   gpu::Commands commands_;
   gpu::ScanPass scan_;
-  gpu::InterpolatePass interpolate_;
+  /// List tolerances, interpolated from those of the counted lists: for one rank, and for one of several
+  /// ranks.
+  gpu::PipelineSet interpolate_;
   gpu::ReducePass reduce_;
   gpu::Buffer thresholds_;
   gpu::Buffer capacities_;

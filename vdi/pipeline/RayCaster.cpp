@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <ranges>
 
+#include "shaders/shared/quota.h"
+
 namespace vdi::detail {
 
 namespace shared = gpu::shared;
@@ -16,7 +18,7 @@ RayCaster::RayCaster(std::shared_ptr<gpu::Device> device, std::uint32_t bands)
       pass_(device_),
       builders_{ListBuilder(device_), ListBuilder(device_)},
       commands_(device_),
-      quotaPass_(device_),
+      quota_(device_, gpu::infoOf<shared::QuotaConstants>("quota")),
       histogram_(device_) {}
 
 namespace {
@@ -246,7 +248,7 @@ void RayCaster::takeLevelSum(Cast& cast, std::span<const LevelSum> sum) {
   }
   commands_.fill(weights_, 0);
   commands_.barrier();
-  quotaPass_.record(commands_, quota);
+  commands_.dispatch(quota_, quota, gpu::groupsFor(quota.width, shared::quotaGroup), quota.rows);
   commands_.barrier();
   commands_.copy(weights_, 0, weightsReadback_, 0, rows * sizeof(std::uint32_t));
   commands_.submit();

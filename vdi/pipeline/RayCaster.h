@@ -17,7 +17,7 @@
 #include "vdi/core/Scene.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/gpu/CastPass.h"
-#include "vdi/gpu/QuotaPass.h"
+#include "vdi/gpu/ComputePipeline.h"
 #include "vdi/gpu/VolumeStore.h"
 #include "vdi/pipeline/HistogramBuffer.h"
 #include "vdi/pipeline/HostAccess.h"
@@ -119,7 +119,7 @@ class RayCaster {
   std::size_t started_ = 0;                        // bands
   std::size_t finished_ = 0;
   gpu::Commands commands_;
-  gpu::QuotaPass quotaPass_;
+  gpu::ComputePipeline quota_;  // the ranks' agreement on lists that they have counted together
   gpu::Buffer levels_;
   gpu::Buffer levelsSum_;
   std::vector<HostAccess*> sumsOnHost_;

@@ -11,20 +11,9 @@ namespace vdi::synthetic {
 
 namespace shared = gpu::shared;
 
-namespace {
-
-gpu::ComputePipelineInfo pipelineInfo() {
-  gpu::ComputePipelineInfo info;
-  info.shader = "field";
-  info.pushConstantBytes = sizeof(shared::FieldConstants);
-  return info;
-}
-
-}  // namespace
-
 DeviceField::DeviceField(std::shared_ptr<gpu::Device> device, const std::string& name, std::uint32_t seed)
     : device_(std::move(device)),
-      pipeline_(device_, pipelineInfo()),
+      pipeline_(device_, gpu::infoOf<shared::FieldConstants>("field")),
       commands_(device_),
       field_(static_cast<std::uint32_t>(fieldIndex(name))),
       seed_(seed) {}
