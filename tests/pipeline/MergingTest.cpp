@@ -140,7 +140,8 @@ TEST_CASE("ranks that agree on one tolerance: each one's lists are those of the 
   for (std::size_t r = 0; r < ranks; ++r) {
     casters[r]->takeLevelSum(casts[r], std::span(&stretch, 1));
     detail::DeviceLists lists;
-    casters[r]->makeBand(casts[r], 0, 43, lists);
+    casters[r]->startBand(casts[r], 0, 43, lists);
+    casters[r]->finishBand();
     weights.push_back(casters[r]->agreedWeights(casts[r]));
     const SupersegmentLists made = test::download<Supersegment>(own, lists);
     // The filters of GPUs have 8 bits, which shows in lists of many short supersegments.

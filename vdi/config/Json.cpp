@@ -193,9 +193,6 @@ void JsonValue::fail(const std::string& what) const {
   failAt(*document_, node_->line, pointer_.empty() ? what : pointer_ + ": " + what);
 }
 
-bool JsonValue::isObject() const {
-  return std::holds_alternative<JsonNode::Members>(node_->value);
-}
 bool JsonValue::isArray() const {
   return std::holds_alternative<std::vector<JsonNode>>(node_->value);
 }

@@ -25,7 +25,6 @@ struct JsonNode;
 /// context.
 class JsonValue {
  public:
-  bool isObject() const;
   bool isArray() const;
   bool isText() const;
   bool isFlag() const;

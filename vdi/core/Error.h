@@ -20,9 +20,6 @@ enum class ErrorCode {
   Cancelled,          // the progress callback asked to stop
 };
 
-/// "InvalidArgument" and so on, for messages.
-const char* toString(ErrorCode code);
-
 /// what() reads "<what> (<context>)"; context names the file, device, rank or property in question and may be
 /// empty.
 class Error : public std::runtime_error {

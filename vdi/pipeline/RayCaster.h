@@ -80,10 +80,6 @@ class RayCaster {
                  const ListBuilder::Behind& behind = {}, const gpu::Submission& after = {});
   /// Waits for the oldest band under way.
   void finishBand();
-  void makeBand(Cast& cast, std::uint32_t firstRow, std::uint32_t lastRow, DeviceLists& lists) {
-    startBand(cast, firstRow, lastRow, lists);
-    finishBand();
-  }
   static constexpr std::size_t bandsAtOnce = 2;
   /// Waits for the submitted work and drops it. For use after an error.
   void drop();

@@ -210,10 +210,6 @@ void vtkVDIGenerator::SetSetting(const char* property, double value) {
   this->Modified();
 }
 
-double vtkVDIGenerator::GetSetting(const char* property) const {
-  return this->Settings[vdi::indexOfSetting(property)];
-}
-
 void vtkVDIGenerator::SetController(vtkMultiProcessController* controller) {
   if (this->Controller == controller) return;
   this->Internal->Regeneration.drop();

@@ -60,15 +60,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   void SetScalarOpacityFunction(vtkPiecewiseFunction* function);
   ///@}
 
-  ///@{
-  /**
-   * The distance over which the opacity function holds, in world units. 0 (default) means the scene's
-   * diagonal divided by the cube root of the number of its voxels, the initial value of ParaView's volume
-   * representation.
-   */
+  /// The distance over which the opacity function holds, in world units. 0 (default) means the scene's
+  /// diagonal divided by the cube root of the number of its voxels, the initial value of ParaView's volume
+  /// representation.
   vtkSetClampMacro(ScalarOpacityUnitDistance, double, 0.0, VTK_DOUBLE_MAX);
-  vtkGetMacro(ScalarOpacityUnitDistance, double);
-  ///@}
 
   /// The component of a multi-component array; -1 (default): the magnitude.
   vtkSetMacro(Component, int);
@@ -93,7 +88,6 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   void SetDiffuse(double share) { this->SetSetting("Diffuse", share); }
   /// Sets a setting by its name, which must be in the table.
   void SetSetting(const char* property, double value);
-  double GetSetting(const char* property) const;
   ///@}
   ///@{
   /**
@@ -111,9 +105,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
    * its normal points is shown.
    */
   vtkSetMacro(Cropping, bool);
-  vtkGetMacro(Cropping, bool);
   vtkSetVector6Macro(CroppingBox, double);
-  vtkGetVector6Macro(CroppingBox, double);
   void AddClippingPlane(double originX, double originY, double originZ, double normalX, double normalY,
                         double normalZ);
   void RemoveAllClippingPlanes();
@@ -125,7 +117,6 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
    * composite blending alone: with another mode, an update fails unless PictureOnly is on.
    */
   vtkSetClampMacro(BlendMode, int, 0, 3);
-  vtkGetMacro(BlendMode, int);
   void AddIsosurfaceValue(double value);
   void RemoveAllIsosurfaceValues();
   ///@}

@@ -49,7 +49,6 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
   // whether viewers may ask for changes, which an extractor carries out (VDISteering.h)
   vtkSetMacro(Steer, bool);
   vtkGetMacro(Steer, bool);
-  vtkBooleanMacro(Steer, bool);
   ///@}
 
   vtkSetFilePathMacro(SteeringLog);  // gets a line of JSON for each change; none: no such file
