@@ -4,15 +4,17 @@
 #include <cstdint>
 
 #include "catalyst_adaptor/FieldCalls.h"
+#include "catalyst_adaptor/Parameters.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
 
 namespace vdi::catalyst {
 
 struct NoLock {};
 
-/// `usable` tells whether a handle lives, and each change holds a `Lock`. `Handle` is the engine's
-/// vdi_catalyst, a FieldCalls.
-template <typename Handle, bool (*usable)(const Handle*), typename Lock = NoLock>
+/// `usable` tells whether a handle lives, `parametersOf` gives a living one's parameters, and each change of
+/// fields holds a `Lock`. `Handle` is the engine's vdi_catalyst, a FieldCalls.
+template <typename Handle, bool (*usable)(const Handle*), Parameters& (*parametersOf)(Handle&),
+          typename Lock = NoLock>
 struct FieldEntries {
   static int setArray(Handle* handle, const char* name, std::int32_t type, std::int32_t association,
                       const void* const* data) {
@@ -37,6 +39,13 @@ struct FieldEntries {
     if (!usable(handle)) return VDI_CATALYST_BAD_ARGUMENT;
     [[maybe_unused]] const Lock lock;
     return catalyst::setParticles(*handle, name, particles);
+  }
+  static double parameterF64(Handle* handle, const char* name, double value, double low, double high) {
+    return usable(handle) ? inForce(*handle, parametersOf(*handle), name, value, low, high) : value;
+  }
+  static std::int64_t parameterI64(Handle* handle, const char* name, std::int64_t value, std::int64_t low,
+                                   std::int64_t high) {
+    return usable(handle) ? inForce(*handle, parametersOf(*handle), name, value, low, high) : value;
   }
   static const char* error(const Handle* handle) { return usable(handle) ? handle->error.c_str() : ""; }
 };

@@ -203,14 +203,8 @@ int execute(vdi_catalyst* catalyst, int64_t step, double time) {
   return usable(catalyst) ? catalyst->run->execute(step, time) : VDI_CATALYST_BAD_ARGUMENT;
 }
 
-double parameterF64(vdi_catalyst* catalyst, const char* name, double value, double low, double high) {
-  if (!usable(catalyst)) return value;
-  return vdi::catalyst::inForce(*catalyst, catalyst->run->parameters(), name, value, low, high);
-}
-
-int64_t parameterI64(vdi_catalyst* catalyst, const char* name, int64_t value, int64_t low, int64_t high) {
-  if (!usable(catalyst)) return value;
-  return vdi::catalyst::inForce(*catalyst, catalyst->run->parameters(), name, value, low, high);
+vdi::catalyst::Parameters& parametersOf(vdi_catalyst& catalyst) {
+  return catalyst.run->parameters();
 }
 
 int finalize(vdi_catalyst* catalyst) {
@@ -222,7 +216,7 @@ int finalize(vdi_catalyst* catalyst) {
   return code;
 }
 
-using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable>;
+using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable, parametersOf>;
 
 }  // namespace
 
@@ -238,8 +232,8 @@ const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
     Entries::setParticles,
     wants,
     execute,
-    parameterF64,
-    parameterI64,
+    Entries::parameterF64,
+    Entries::parameterI64,
     finalize,
     Entries::error,
     nullptr,

@@ -194,14 +194,8 @@ int execute(vdi_catalyst* catalyst, int64_t step, double time) {
   return result;
 }
 
-double parameterF64(vdi_catalyst* catalyst, const char* name, double value, double low, double high) {
-  if (!usable(catalyst)) return value;
-  return vdi::catalyst::inForce(*catalyst, catalyst->engine->parameters(), name, value, low, high);
-}
-
-int64_t parameterI64(vdi_catalyst* catalyst, const char* name, int64_t value, int64_t low, int64_t high) {
-  if (!usable(catalyst)) return value;
-  return vdi::catalyst::inForce(*catalyst, catalyst->engine->parameters(), name, value, low, high);
+vdi::catalyst::Parameters& parametersOf(vdi_catalyst& catalyst) {
+  return catalyst.engine->parameters();
 }
 
 int finalize(vdi_catalyst* catalyst) {
@@ -217,7 +211,7 @@ int finalize(vdi_catalyst* catalyst) {
   return code;
 }
 
-using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable, PythonLock>;
+using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable, parametersOf, PythonLock>;
 
 }  // namespace
 
@@ -233,8 +227,8 @@ const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
     Entries::setParticles,
     wants,
     execute,
-    parameterF64,
-    parameterI64,
+    Entries::parameterF64,
+    Entries::parameterI64,
     finalize,
     Entries::error,
     nullptr,
