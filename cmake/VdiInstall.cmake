@@ -27,6 +27,7 @@ install(
   FILES_MATCHING PATTERN "*.h"
   PATTERN JsonText.h EXCLUDE
   PATTERN ListCodec.h EXCLUDE
+  PATTERN Markup.h EXCLUDE
   PATTERN VdiLayout.h EXCLUDE)
 install(FILES vdi/comm/Communicator.h vdi/comm/Transport.h DESTINATION "${headerDir}/vdi/comm")
 install(FILES vdi/gpu/Device.h vdi/gpu/DeviceLimits.h vdi/gpu/DeviceRequest.h

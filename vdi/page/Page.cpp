@@ -12,6 +12,7 @@
 
 #include "PageTemplate.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Markup.h"
 #include "vdi/core/Parallel.h"
 #include "vdi/io/Files.h"
 #include "vdi/page/PlainChunks.h"
@@ -81,30 +82,6 @@ std::string base64(std::span<const std::byte> bytes) {
     for (std::size_t d = 0; d < 4; ++d) text += d <= count ? digits[(word >> (18 - 6 * d)) & 63U] : '=';
   }
   return text;
-}
-
-/// For text and attributes of HTML.
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        result += "&amp;";
-        break;
-      case '<':
-        result += "&lt;";
-        break;
-      case '>':
-        result += "&gt;";
-        break;
-      case '"':
-        result += "&quot;";
-        break;
-      default:
-        result += c;
-    }
-  }
-  return result;
 }
 
 /// The page before and after the frames.

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "vdi/core/Error.h"
+#include "vdi/core/Markup.h"
 
 namespace vdi::runlog {
 
@@ -25,27 +26,6 @@ constexpr std::size_t mostHints = 2000;  // more would make a large file slow to
 constexpr std::array<const char*, 8> palette{"#999999", "#0072B2", "#E69F00", "#56B4E9",
                                              "#009E73", "#CC79A7", "#F0E442", "#D55E00"};
 constexpr const char* failure = "#c00000";
-
-/// For an element's text.
-std::string escaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      default:
-        out += static_cast<unsigned char>(c) < ' ' ? ' ' : c;
-    }
-  }
-  return out;
-}
 
 /// A distance between ticks that people read easily, for about `count` of them up to `most`.
 double tickDistance(double most, int count) {
