@@ -58,29 +58,22 @@ FolderWatch::FolderWatch(std::filesystem::path folder)
     : folder_(std::move(folder)), descriptor_(::inotify_init1(IN_NONBLOCK | IN_CLOEXEC)) {
   std::error_code error;
   const std::filesystem::directory_iterator entries(folder_, error);
-  if (error) {
-    if (descriptor_ >= 0) ::close(descriptor_);
-    throw Error(ErrorCode::Io, "can't read the folder: " + error.message(), folder_.string());
-  }
+  if (error) throw Error(ErrorCode::Io, "can't read the folder: " + error.message(), folder_.string());
   watch();
-}
-
-FolderWatch::~FolderWatch() {
-  if (descriptor_ >= 0) ::close(descriptor_);
 }
 
 /// Watches the folder that has the name now, unless it is watched already.
 void FolderWatch::watch() const {
-  if (descriptor_ < 0) return;
+  if (!descriptor_.isOpen()) return;
   // A file that is opened without a name (O_TMPFILE) is created when it gets one.
-  (void)::inotify_add_watch(descriptor_, folder_.c_str(),
+  (void)::inotify_add_watch(descriptor(), folder_.c_str(),
                             IN_CREATE | IN_CLOSE_WRITE | IN_MOVED_TO | IN_ONLYDIR);
 }
 
 std::vector<std::filesystem::path> FolderWatch::changed() {
-  if (descriptor_ >= 0) {
+  if (descriptor_.isOpen()) {
     std::array<std::byte, 4096> events{};
-    while (::read(descriptor_, events.data(), events.size()) > 0) {
+    while (::read(descriptor(), events.data(), events.size()) > 0) {
     }
     watch();  // before the listing, so that no file appears unseen in between
   }

@@ -9,19 +9,18 @@
 #include <string>
 #include <vector>
 
+#include "vdi/core/Descriptor.h"
+
 namespace vdi::apps {
 
 class FolderWatch {
  public:
   /// Throws Error{Io} for anything but a readable folder.
   explicit FolderWatch(std::filesystem::path folder);
-  ~FolderWatch();
-  FolderWatch(const FolderWatch&) = delete;
-  FolderWatch& operator=(const FolderWatch&) = delete;
 
   /// Becomes readable when this machine has changed the folder since the last call of changed(). -1
   /// if the system has no watches left (fs.inotify.max_user_instances).
-  int descriptor() const { return descriptor_; }
+  int descriptor() const { return descriptor_.number(); }
 
   /// Returns the files named *.vdi that are new since the last call, or whose size or time has
   /// changed. They are ordered by name, with numbers compared as numbers. Names that begin with a
@@ -38,7 +37,7 @@ class FolderWatch {
   void watch() const;
 
   std::filesystem::path folder_;
-  int descriptor_;
+  Descriptor descriptor_;
   std::map<std::filesystem::path, Look> known_;
 };
 

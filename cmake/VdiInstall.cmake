@@ -25,6 +25,7 @@ install(
   DIRECTORY vdi/core vdi/io
   DESTINATION "${headerDir}/vdi"
   FILES_MATCHING PATTERN "*.h"
+  PATTERN Descriptor.h EXCLUDE
   PATTERN JsonText.h EXCLUDE
   PATTERN ListCodec.h EXCLUDE
   PATTERN Markup.h EXCLUDE

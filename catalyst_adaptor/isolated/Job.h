@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "catalyst_adaptor/isolated/Socket.h"
+#include "vdi/core/Descriptor.h"
 
 namespace vdi::catalyst {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "catalyst_adaptor/isolated/Socket.h"
+#include "vdi/core/Descriptor.h"
 
 namespace vdi::catalyst {
 

@@ -9,23 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "vdi/core/Descriptor.h"
+
 namespace vdi::catalyst {
-
-/// Closes a descriptor. -1: none.
-class Descriptor {
- public:
-  Descriptor() = default;
-  explicit Descriptor(int number) : number_(number) {}
-  Descriptor(Descriptor&& other) noexcept : number_(other.release()) {}
-  Descriptor& operator=(Descriptor&& other) noexcept;
-  ~Descriptor();
-  int number() const { return number_; }
-  bool isOpen() const { return number_ >= 0; }
-  int release();
-
- private:
-  int number_ = -1;
-};
 
 /// A name for sockets of one run that no other run has.
 std::string newSocketName();

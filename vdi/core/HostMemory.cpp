@@ -15,6 +15,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "vdi/core/Descriptor.h"
 #include "vdi/core/Error.h"
 
 namespace vdi {
@@ -27,20 +28,6 @@ constexpr std::uint64_t page = 65536;
 std::uint64_t wholePages(std::uint64_t bytes) {
   return (std::max<std::uint64_t>(bytes, 1) + page - 1) / page * page;
 }
-
-class File {
- public:
-  explicit File(int descriptor) : descriptor_(descriptor) {}
-  ~File() {
-    if (descriptor_ >= 0) close(descriptor_);
-  }
-  File(const File&) = delete;
-  File& operator=(const File&) = delete;
-  int descriptor() const { return descriptor_; }
-
- private:
-  int descriptor_;
-};
 
 [[noreturn]] void throwNoRoom(std::uint64_t bytes, const char* kind, int error) {
   throw Error(ErrorCode::OutOfMemory,
@@ -64,8 +51,8 @@ void removeNamesOfTheDead() {
   for (Iterator entry(folder, unreadable); !unreadable && entry != Iterator(); entry.increment(unreadable)) {
     const std::string name = fmt::format("/{}", entry->path().filename().string());
     if (!name.starts_with(prefix)) continue;
-    const File file(shm_open(name.c_str(), O_RDWR, 0));  // fails for another user's memory
-    if (file.descriptor() >= 0 && flock(file.descriptor(), LOCK_EX | LOCK_NB) == 0) shm_unlink(name.c_str());
+    const Descriptor file(shm_open(name.c_str(), O_RDWR, 0));  // fails for another user's memory
+    if (file.isOpen() && flock(file.number(), LOCK_EX | LOCK_NB) == 0) shm_unlink(name.c_str());
   }
 }
 
@@ -121,14 +108,14 @@ bool HostMemory::publish() {
 std::shared_ptr<HostMemory> HostMemory::open(const std::string& name, std::uint64_t bytes) {
   std::shared_ptr<HostMemory> memory(new HostMemory);
   const std::uint64_t size = wholePages(bytes);
-  const File file(shm_open(name.c_str(), O_RDWR, 0));
+  const Descriptor file(shm_open(name.c_str(), O_RDWR, 0));
   struct stat status {};
-  if (file.descriptor() < 0 || fstat(file.descriptor(), &status) != 0 ||
+  if (!file.isOpen() || fstat(file.number(), &status) != 0 ||
       static_cast<std::uint64_t>(status.st_size) < size) {
     throw Error(ErrorCode::Communication,
                 fmt::format("the shared memory {} of another rank can't be opened", name));
   }
-  memory->bytes_ = map(size, MAP_SHARED, file.descriptor(), "shared");
+  memory->bytes_ = map(size, MAP_SHARED, file.number(), "shared");
   memory->name_ = name;
   return memory;
 }

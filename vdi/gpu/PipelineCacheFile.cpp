@@ -14,6 +14,8 @@
 #include <system_error>
 #include <utility>
 
+#include "vdi/core/Descriptor.h"
+
 namespace vdi::gpu {
 
 namespace {
@@ -40,44 +42,14 @@ std::string hex(const std::array<std::uint8_t, VK_UUID_SIZE>& uuid) {
   return text;
 }
 
-/// A file descriptor that its destructor closes.
-class OpenFile {
- public:
-  explicit OpenFile(int descriptor) : descriptor_(descriptor) {}
-  ~OpenFile() {
-    if (descriptor_ >= 0) close(descriptor_);
+bool readAll(int descriptor, std::span<std::byte> to) {
+  while (!to.empty()) {
+    const ssize_t got = ::read(descriptor, to.data(), to.size());
+    if (got <= 0) return false;
+    to = to.subspan(static_cast<std::size_t>(got));
   }
-  OpenFile(const OpenFile&) = delete;
-  OpenFile& operator=(const OpenFile&) = delete;
-  OpenFile(OpenFile&&) = delete;
-  OpenFile& operator=(OpenFile&&) = delete;
-  bool isOpen() const { return descriptor_ >= 0; }
-  int descriptor() const { return descriptor_; }
-
-  bool read(void* to, std::size_t bytes) const {
-    auto* at = static_cast<std::byte*>(to);
-    while (bytes > 0) {
-      const ssize_t got = ::read(descriptor_, at, bytes);
-      if (got <= 0) return false;
-      at += got;
-      bytes -= static_cast<std::size_t>(got);
-    }
-    return true;
-  }
-  bool write(const void* from, std::size_t bytes) const {
-    const auto* at = static_cast<const std::byte*>(from);
-    while (bytes > 0) {
-      const ssize_t put = ::write(descriptor_, at, bytes);
-      if (put <= 0) return false;
-      at += put;
-      bytes -= static_cast<std::size_t>(put);
-    }
-    return true;
-  }
-
- private:
-  int descriptor_;
-};
+  return true;
+}
 
 /// Whether the data begin with Vulkan's header for this device, and have more than that.
 bool suits(std::span<const std::byte> data, const PipelineCacheKey& key) {
@@ -116,20 +88,20 @@ PipelineCacheFile::PipelineCacheFile(std::string folder, const PipelineCacheKey&
 std::vector<std::byte> PipelineCacheFile::read() const noexcept {
   if (path_.empty()) return {};
   try {
-    const OpenFile file(open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+    const Descriptor file(open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
     struct stat state {};
-    if (!file.isOpen() || fstat(file.descriptor(), &state) != 0 || !S_ISREG(state.st_mode) ||
+    if (!file.isOpen() || fstat(file.number(), &state) != 0 || !S_ISREG(state.st_mode) ||
         state.st_uid != geteuid())
       return {};
     Header header;
     const Header expected;
     const auto bytes = static_cast<std::uint64_t>(state.st_size);
-    if (bytes < sizeof header || bytes > maxBytes || !file.read(&header, sizeof header) ||
+    if (bytes < sizeof header || bytes > maxBytes ||
+        !readAll(file.number(), std::as_writable_bytes(std::span(&header, 1))) ||
         header.what != expected.what || header.bytes != bytes - sizeof header)
       return {};
     std::vector<std::byte> data(header.bytes);
-    if (!file.read(data.data(), data.size()) || checksumOf(data) != header.checksum || !suits(data, key_))
-      return {};
+    if (!readAll(file.number(), data) || checksumOf(data) != header.checksum || !suits(data, key_)) return {};
     return data;
   } catch (const std::exception&) {  // no memory
     return {};
@@ -142,12 +114,13 @@ void PipelineCacheFile::write(std::span<const std::byte> data) const noexcept {
     std::error_code failed;
     std::filesystem::create_directories(folder_, failed);
     std::string temporary = path_ + ".XXXXXX";
-    const OpenFile file(mkostemp(temporary.data(), O_CLOEXEC));
+    const Descriptor file(mkostemp(temporary.data(), O_CLOEXEC));
     if (!file.isOpen()) return;
     Header header;
     header.bytes = data.size();
     header.checksum = checksumOf(data);
-    const bool isWritten = file.write(&header, sizeof header) && file.write(data.data(), data.size());
+    const bool isWritten =
+        writeAll(file.number(), std::as_bytes(std::span(&header, 1))) && writeAll(file.number(), data);
     if (!isWritten || std::rename(temporary.c_str(), path_.c_str()) != 0) unlink(temporary.c_str());
   } catch (const std::exception&) {  // the next run compiles again
   }

@@ -18,6 +18,7 @@
 #include <system_error>
 #include <utility>
 
+#include "vdi/core/Descriptor.h"
 #include "vdi/core/Error.h"
 
 namespace vdi::io {
@@ -38,27 +39,6 @@ const char* kindOf(mode_t mode) {
   if (S_ISSOCK(mode)) return "a socket";
   return S_ISBLK(mode) ? "a block device" : "a device";
 }
-
-/// A file descriptor that is closed at the end; -1 for none.
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  ~Descriptor() {
-    if (number_ >= 0) ::close(number_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  explicit operator bool() const { return number_ >= 0; }
-  int get() const { return number_; }
-  /// Returns close's result.
-  int close() { return ::close(std::exchange(number_, -1)); }
-  /// Requires that none is open.
-  void open(int number) { number_ = number; }
-  int release() { return std::exchange(number_, -1); }
-
- private:
-  int number_;
-};
 
 /// Makes a closed pipe an error of the write instead of the end of this process.
 class PipeSignalBlocked {
@@ -84,17 +64,13 @@ class PipeSignalBlocked {
   sigset_t before_{};
 };
 
-/// Writes at an offset, or, if the file has none, after the bytes written before.
-void writeTo(int descriptor, std::optional<std::uint64_t> offset, std::span<const std::byte> bytes,
-             const fs::path& path) {
+void writeTo(int descriptor, std::uint64_t offset, std::span<const std::byte> bytes, const fs::path& path) {
   while (!bytes.empty()) {
-    const ssize_t written =
-        offset ? ::pwrite(descriptor, bytes.data(), bytes.size(), static_cast<off_t>(*offset))
-               : ::write(descriptor, bytes.data(), bytes.size());
+    const ssize_t written = ::pwrite(descriptor, bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (written < 0 && errno == EINTR) continue;
     if (written < 0) fail("write the file", errno, path);
     bytes = bytes.subspan(static_cast<std::size_t>(written));
-    if (offset) *offset += static_cast<std::uint64_t>(written);
+    offset += static_cast<std::uint64_t>(written);
   }
 }
 
@@ -147,14 +123,16 @@ void requireWritable(const Destination& to) {
 }
 
 /// Opens a device or pipe.
-int openAsItIs(const fs::path& path) {
+Descriptor openAsItIs(const fs::path& path) {
   // Non-blocking: a pipe without a reader is refused, not waited for.
   Descriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY | O_NONBLOCK));
-  if (!file && errno == ENXIO) throw Error(ErrorCode::Io, "nobody reads from the pipe", path.string());
-  if (!file) fail("open the file", errno, path);
-  const int flags = ::fcntl(file.get(), F_GETFL);
-  if (flags < 0 || ::fcntl(file.get(), F_SETFL, flags & ~O_NONBLOCK) != 0) fail("open the file", errno, path);
-  return file.release();
+  if (!file.isOpen() && errno == ENXIO)
+    throw Error(ErrorCode::Io, "nobody reads from the pipe", path.string());
+  if (!file.isOpen()) fail("open the file", errno, path);
+  const int flags = ::fcntl(file.number(), F_GETFL);
+  if (flags < 0 || ::fcntl(file.number(), F_SETFL, flags & ~O_NONBLOCK) != 0)
+    fail("open the file", errno, path);
+  return file;
 }
 
 /// An unused name in the folder. It has a random part, because process numbers repeat between the nodes of a
@@ -186,7 +164,8 @@ void copyAll(int from, int to, const fs::path& path) {
 /// Makes the new name survive a power cut. File systems that cannot do this report other errors.
 void synchronizeFolder(const Destination& to) {
   const Descriptor folder(::open(to.folder().c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (folder && ::fsync(folder.get()) != 0 && errno == EIO) fail("write the folder", errno, to.path);
+  if (folder.isOpen() && ::fsync(folder.number()) != 0 && errno == EIO)
+    fail("write the folder", errno, to.path);
 }
 
 }  // namespace
@@ -232,17 +211,17 @@ std::vector<std::byte> InputFile::read(std::uint64_t offset, std::uint64_t count
 
 struct OutputFile::State {
   Destination to;
-  Descriptor file{-1};
+  Descriptor file;
   fs::path name;  // its temporary name; empty while the file has none
 
   explicit State(const fs::path& path) : to(path) {
     requireWritable(to);
     if (to.through) {
-      file.open(openAsItIs(to.path));
+      file = openAsItIs(to.path);
       return;
     }
-    file.open(::open(to.folder().c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0666));
-    if (!file) file.open(createNamed());
+    file = Descriptor(::open(to.folder().c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, 0666));
+    if (!file.isOpen()) file = createNamed();
   }
   ~State() {
     if (!name.empty()) ::unlink(name.c_str());
@@ -252,16 +231,16 @@ struct OutputFile::State {
   State(State&&) = delete;
   State& operator=(State&&) = delete;
 
-  int createNamed() {
+  Descriptor createNamed() {
     fs::path candidate;
-    int descriptor = -1;
+    Descriptor made;
     do {
       candidate = temporaryName(to.folder());
-      descriptor = ::open(candidate.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    } while (descriptor < 0 && errno == EEXIST);
-    if (descriptor < 0) fail("create the file", errno, to.path);
+      made = Descriptor(::open(candidate.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+    } while (!made.isOpen() && errno == EEXIST);
+    if (!made.isOpen()) fail("create the file", errno, to.path);
     name = candidate;
-    return descriptor;
+    return made;
   }
 
   /// Only a renamed file can replace another one, a link cannot; and other processes need a name.
@@ -271,24 +250,23 @@ struct OutputFile::State {
     bool named = false;
     do {
       candidate = temporaryName(to.folder());
-      named = giveName(file.get(), candidate);
+      named = giveName(file.number(), candidate);
     } while (!named && errno == EEXIST);
     if (named) {
       name = candidate;
       return;
     }
-    Descriptor other(createNamed());
-    copyAll(file.get(), other.get(), to.path);
-    file.close();
-    file.open(other.release());
+    Descriptor other = createNamed();
+    copyAll(file.number(), other.number(), to.path);
+    file = std::move(other);
   }
 
   /// Takes the permissions of the file that it replaces.
   void takePermissions() {
     if (!to.status) return;
     // Only root may give files away; otherwise the file belongs to this process's user.
-    static_cast<void>(::fchown(file.get(), to.status->st_uid, to.status->st_gid) == 0);
-    if (::fchmod(file.get(), to.status->st_mode & 07777U) != 0) fail("set permissions", errno, to.path);
+    static_cast<void>(::fchown(file.number(), to.status->st_uid, to.status->st_gid) == 0);
+    if (::fchmod(file.number(), to.status->st_mode & 07777U) != 0) fail("set permissions", errno, to.path);
   }
 
   void close() {
@@ -297,8 +275,8 @@ struct OutputFile::State {
 
   void replace() {
     takePermissions();
-    if (::fsync(file.get()) != 0) fail("write the file", errno, to.path);
-    if (name.empty() && !to.status && giveName(file.get(), to.file)) {
+    if (::fsync(file.number()) != 0) fail("write the file", errno, to.path);
+    if (name.empty() && !to.status && giveName(file.number(), to.file)) {
       close();
     } else {
       requireName();
@@ -319,16 +297,16 @@ bool OutputFile::takesOffsets() const {
 
 void OutputFile::write(std::uint64_t offset, std::span<const std::byte> bytes) {
   if (takesOffsets()) {
-    writeTo(state_->file.get(), offset, bytes, state_->to.path);
+    writeTo(state_->file.number(), offset, bytes, state_->to.path);
   } else {
     const PipeSignalBlocked blocked;
-    writeTo(state_->file.get(), std::nullopt, bytes, state_->to.path);
+    if (!writeAll(state_->file.number(), bytes)) fail("write the file", errno, state_->to.path);
   }
 }
 
 void OutputFile::reserve(std::uint64_t bytes) {
   if (!takesOffsets()) return;
-  const int file = state_->file.get();
+  const int file = state_->file.number();
   const auto size = static_cast<off_t>(bytes);
   int result = 0;
   do {

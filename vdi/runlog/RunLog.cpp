@@ -6,10 +6,12 @@
 
 #include <cerrno>
 #include <optional>
+#include <span>
 #include <string>
 #include <system_error>
 #include <utility>
 
+#include "vdi/core/Descriptor.h"
 #include "vdi/core/Error.h"
 
 namespace vdi::runlog {
@@ -32,46 +34,36 @@ class RunLog::Appended {
     if (error) throw Error(ErrorCode::Io, "can't make the log's folder: " + error.message(), path_.string());
     // Non-blocking, for a pipe without a reader would be waited for.
     constexpr mode_t readable = 0666;
-    descriptor_ =
-        ::open(path_.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK, readable);
-    if (descriptor_ < 0) failWith("open the log", errno, path_);
+    descriptor_ = Descriptor(
+        ::open(path_.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK, readable));
+    if (!descriptor_.isOpen()) failWith("open the log", errno, path_);
     struct stat status {};
-    if (::fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode)) return;
-    ::close(descriptor_);
-    throw Error(ErrorCode::Io, "the log must be a regular file", path_.string());
+    if (::fstat(descriptor_.number(), &status) != 0 || !S_ISREG(status.st_mode))
+      throw Error(ErrorCode::Io, "the log must be a regular file", path_.string());
   }
-  ~Appended() { ::close(descriptor_); }
-  Appended(const Appended&) = delete;
-  Appended& operator=(const Appended&) = delete;
 
   void empty() {
-    if (::ftruncate(descriptor_, 0) != 0) failWith("empty the log", errno, path_);
+    if (::ftruncate(descriptor_.number(), 0) != 0) failWith("empty the log", errno, path_);
   }
 
   void append(const std::string& line) {
-    const off_t before = ::lseek(descriptor_, 0, SEEK_END);
+    const int file = descriptor_.number();
+    const off_t before = ::lseek(file, 0, SEEK_END);
     if (before < 0) failWith("write the log", errno, path_);
     std::string bytes = line + '\n';
     char last = '\n';
     // A line that another program has left unfinished doesn't spoil this one.
-    if (before > 0 && ::pread(descriptor_, &last, 1, before - 1) == 1 && last != '\n')
-      bytes.insert(0, 1, '\n');
-    std::size_t done = 0;
-    while (done < bytes.size()) {
-      const ssize_t written = ::write(descriptor_, bytes.data() + done, bytes.size() - done);
-      if (written < 0 && errno == EINTR) continue;
-      if (written <= 0) {
-        const int reason = written < 0 ? errno : EIO;
-        if (done > 0) (void)::ftruncate(descriptor_, before);
-        failWith("write the log", reason, path_);
-      }
-      done += static_cast<std::size_t>(written);
-    }
+    if (before > 0 && ::pread(file, &last, 1, before - 1) == 1 && last != '\n') bytes.insert(0, 1, '\n');
+    if (writeAll(file, std::as_bytes(std::span(bytes)))) return;
+    const int reason = errno;
+    const bool isPartWritten = ::lseek(file, 0, SEEK_CUR) > before;
+    if (isPartWritten) (void)::ftruncate(file, before);
+    failWith("write the log", reason, path_);
   }
 
  private:
   std::filesystem::path path_;
-  int descriptor_ = -1;
+  Descriptor descriptor_;
 };
 
 RunLog::RunLog(const LogFiles& files, const RunStart& start, Before before) {

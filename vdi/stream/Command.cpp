@@ -81,15 +81,9 @@ Command::Ending endingOf(int status) {
 Command::Command(const std::string& text) {
   std::array<int, 2> ends{};
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) failToStart(errno);
-  try {
-    process_ = Setup(ends[1]).start(text);
-  } catch (const Error&) {
-    ::close(ends[0]);
-    ::close(ends[1]);
-    throw;
-  }
-  ::close(ends[1]);
-  socket_ = ends[0];
+  socket_ = Descriptor(ends[0]);
+  const Descriptor other(ends[1]);
+  process_ = Setup(other.number()).start(text);
 }
 
 Command::~Command() {
@@ -97,11 +91,11 @@ Command::~Command() {
 }
 
 int Command::takeSocket() {
-  return std::exchange(socket_, -1);
+  return socket_.release();
 }
 
 Command::Ending Command::end() {
-  if (socket_ >= 0) ::close(std::exchange(socket_, -1));
+  socket_ = Descriptor();
   if (process_ < 0) return ending_;
   int status = 0;
   for (const int signal : {0, SIGTERM}) {

@@ -5,6 +5,8 @@
 
 #include <string>
 
+#include "vdi/core/Descriptor.h"
+
 namespace vdi::stream {
 
 class Command {
@@ -28,7 +30,7 @@ class Command {
   Ending end();
 
  private:
-  int socket_ = -1;
+  Descriptor socket_;
   pid_t process_ = -1;  // none: it has ended
   Ending ending_;
 };

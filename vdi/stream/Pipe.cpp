@@ -10,9 +10,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <thread>
 #include <vector>
 
+#include "vdi/core/Descriptor.h"
 #include "vdi/core/Error.h"
 #include "vdi/stream/Protocol.h"
 
@@ -26,47 +28,25 @@ constexpr std::size_t bufferBytes = std::size_t{256} << 10;
   throw Error(ErrorCode::Io, std::string(what) + ": " + std::strerror(errno));
 }
 
-class Descriptor {
- public:
-  explicit Descriptor(int number) : number_(number) {}
-  ~Descriptor() { ::close(number_); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int number() const { return number_; }
-
- private:
-  int number_;
-};
-
-/// Returns the number of bytes read; 0 or less at the end.
-ssize_t readSome(int from, std::vector<char>& buffer) {
+/// Returns the part of the buffer that was read; none at the end.
+std::span<const std::byte> readSome(int from, std::span<std::byte> buffer) {
   for (;;) {
     const ssize_t count = ::read(from, buffer.data(), buffer.size());
-    if (count >= 0 || errno != EINTR) return count;
+    if (count >= 0) return buffer.first(static_cast<std::size_t>(count));
+    if (errno != EINTR) return {};
   }
-}
-
-bool writeAll(int to, const char* bytes, std::size_t count) {
-  while (count > 0) {
-    const ssize_t written = ::write(to, bytes, count);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) return false;
-    bytes += written;
-    count -= static_cast<std::size_t>(written);
-  }
-  return true;
 }
 
 /// Copies bytes until the input ends, the output fails, or `stop` has something to read.
 void carry(int from, int to, int stop) {
-  std::vector<char> buffer(bufferBytes);
+  std::vector<std::byte> buffer(bufferBytes);
   for (;;) {
     std::array<pollfd, 2> ready{{{from, POLLIN, 0}, {stop, POLLIN, 0}}};
     if (::poll(ready.data(), ready.size(), -1) < 0 && errno != EINTR) return;
     if (ready[1].revents != 0) return;
     if (ready[0].revents == 0) continue;
-    const ssize_t count = readSome(from, buffer);
-    if (count <= 0 || !writeAll(to, buffer.data(), static_cast<std::size_t>(count))) return;
+    const std::span<const std::byte> bytes = readSome(from, buffer);
+    if (bytes.empty() || !writeAll(to, bytes)) return;
   }
 }
 
@@ -90,19 +70,19 @@ void serveOver(Server& server, const std::string& token, int input, int output) 
   const Descriptor socket(ends[0]);
   server.adopt(ends[1]);
   const Descriptor stop(::eventfd(0, EFD_CLOEXEC));
-  if (stop.number() < 0) failByErrno("can't connect to the server");
+  if (!stop.isOpen()) failByErrno("can't connect to the server");
 
   const std::string first = greeting(token) + "\n";
-  if (!writeAll(output, first.data(), first.size())) return;
+  if (!writeAll(output, std::as_bytes(std::span(first)))) return;
   std::thread inwards([&] {
     carry(input, socket.number(), stop.number());
     ::shutdown(socket.number(), SHUT_WR);
   });
-  std::vector<char> buffer(bufferBytes);
-  for (ssize_t count = 1; count > 0;) {
-    count = readSome(socket.number(), buffer);
-    if (count > 0 && !writeAll(output, buffer.data(), static_cast<std::size_t>(count))) break;
-  }
+  std::vector<std::byte> buffer(bufferBytes);
+  std::span<const std::byte> bytes;
+  do {
+    bytes = readSome(socket.number(), buffer);
+  } while (!bytes.empty() && writeAll(output, bytes));
   const std::uint64_t one = 1;
   (void)!::write(stop.number(), &one, sizeof(one));
   ::shutdown(socket.number(), SHUT_RDWR);

@@ -31,7 +31,7 @@
 
 namespace {
 
-using vdi::catalyst::Descriptor;
+using vdi::Descriptor;
 using vdi::catalyst::isOfMpiJob;
 using vdi::catalyst::Packer;
 using vdi::catalyst::Say;
