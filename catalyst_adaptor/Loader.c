@@ -239,61 +239,41 @@ static void restore(vdi_saved* saved) {
   }
 }
 
-/* This function and the next three run only our own code, which changes nothing but the floating-point
- * environment. */
+/* The body of a function that calls the engine's entry, if there is one. These entries run only our own code,
+ * which changes nothing but the floating-point environment. */
+#define RETURN_CALL(type, without_engine, call)                  \
+  const vdi_catalyst_functions* engine = functions_of(catalyst); \
+  if (engine == NULL) return (without_engine);                   \
+  fenv_t floating_point;                                         \
+  feholdexcept(&floating_point);                                 \
+  const type result = engine->call;                              \
+  fesetenv(&floating_point);                                     \
+  return result
+
 int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
-  const vdi_catalyst_functions* engine = functions_of(catalyst);
-  if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
-  fenv_t floating_point;
-  feholdexcept(&floating_point);
-  const int code = engine->set_blocks(catalyst, count, blocks);
-  fesetenv(&floating_point);
-  return code;
+  RETURN_CALL(int, VDI_CATALYST_BAD_ARGUMENT, set_blocks(catalyst, count, blocks));
 }
 
 int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
                            const void* const* data) {
-  const vdi_catalyst_functions* engine = functions_of(catalyst);
-  if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
-  fenv_t floating_point;
-  feholdexcept(&floating_point);
-  const int code = engine->set_array(catalyst, name, type, association, data);
-  fesetenv(&floating_point);
-  return code;
+  RETURN_CALL(int, VDI_CATALYST_BAD_ARGUMENT, set_array(catalyst, name, type, association, data));
 }
 
 int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int32_t type,
                                    int32_t association, int32_t components, const void* const* data,
                                    const vdi_catalyst_strides* strides) {
-  const vdi_catalyst_functions* engine = functions_of(catalyst);
-  if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
-  fenv_t floating_point;
-  feholdexcept(&floating_point);
-  const int code = engine->set_array_strided(catalyst, name, type, association, components, data, strides);
-  fesetenv(&floating_point);
-  return code;
+  RETURN_CALL(int, VDI_CATALYST_BAD_ARGUMENT,
+              set_array_strided(catalyst, name, type, association, components, data, strides));
 }
 
 int vdi_catalyst_set_array_offset(vdi_catalyst* catalyst, const char* name, int32_t association,
                                   const double offset[3]) {
-  const vdi_catalyst_functions* engine = functions_of(catalyst);
-  if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
-  fenv_t floating_point;
-  feholdexcept(&floating_point);
-  const int code = engine->set_array_offset(catalyst, name, association, offset);
-  fesetenv(&floating_point);
-  return code;
+  RETURN_CALL(int, VDI_CATALYST_BAD_ARGUMENT, set_array_offset(catalyst, name, association, offset));
 }
 
 int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const char* name,
                                const vdi_catalyst_particles* particles) {
-  const vdi_catalyst_functions* engine = functions_of(catalyst);
-  if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
-  fenv_t floating_point;
-  feholdexcept(&floating_point);
-  const int code = engine->set_particles(catalyst, name, particles);
-  fesetenv(&floating_point);
-  return code;
+  RETURN_CALL(int, VDI_CATALYST_BAD_ARGUMENT, set_particles(catalyst, name, particles));
 }
 
 int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time) {
@@ -321,27 +301,14 @@ void vdi_catalyst_set_clock(vdi_catalyst* catalyst, double seconds) {
   if (engine != NULL && engine->set_clock != NULL) engine->set_clock(catalyst, seconds);
 }
 
-/* Like vdi_catalyst_set_blocks, these functions run only our own code. */
 double vdi_catalyst_parameter_f64(vdi_catalyst* catalyst, const char* name, double value, double low,
                                   double high) {
-  const vdi_catalyst_functions* engine = functions_of(catalyst);
-  if (engine == NULL) return value;
-  fenv_t floating_point;
-  feholdexcept(&floating_point);
-  const double result = engine->parameter_f64(catalyst, name, value, low, high);
-  fesetenv(&floating_point);
-  return result;
+  RETURN_CALL(double, value, parameter_f64(catalyst, name, value, low, high));
 }
 
 int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, const char* name, int64_t value, int64_t low,
                                    int64_t high) {
-  const vdi_catalyst_functions* engine = functions_of(catalyst);
-  if (engine == NULL) return value;
-  fenv_t floating_point;
-  feholdexcept(&floating_point);
-  const int64_t result = engine->parameter_i64(catalyst, name, value, low, high);
-  fesetenv(&floating_point);
-  return result;
+  RETURN_CALL(int64_t, value, parameter_i64(catalyst, name, value, low, high));
 }
 
 int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
