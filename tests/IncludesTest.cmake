@@ -111,10 +111,10 @@ foreach(file IN LISTS files)
   endforeach()
 endforeach()
 
-# No unit (a header and its source) may include itself by way of others of its folder. The plugin's filters and
-# views know each other.
+# No unit (a header and its source) may include itself by way of others of its folder. In the plugin's views, a
+# VDI's notices depend on the other VDIs in sight, so vtkVDIProp and VDINotices know each other.
 foreach(folder IN LISTS folders)
-  if(folder MATCHES "^plugin/")
+  if(folder STREQUAL "${paraview}/Representations")
     continue()
   endif()
   list(REMOVE_DUPLICATES "units_of_${folder}")

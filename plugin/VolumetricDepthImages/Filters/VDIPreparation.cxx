@@ -1,22 +1,13 @@
 #include "VDIPreparation.h"
 
-#include <vtkCommunicator.h>
-#include <vtkMultiProcessController.h>
-
 #include <algorithm>
 #include <exception>
 #include <optional>
 #include <utility>
 
-namespace pv {
+#include "VDISession.h"
 
-bool onAllRanks(vtkMultiProcessController* controller, bool here) {
-  if (controller == nullptr || controller->GetNumberOfProcesses() == 1) return here;
-  const int mine = here ? 1 : 0;
-  int all = 0;
-  controller->AllReduce(&mine, &all, 1, vtkCommunicator::MIN_OP);
-  return all != 0;
-}
+namespace pv {
 
 Preparation::Preparation(std::shared_ptr<Volume> volume, vtkMTimeType time, Make make)
     : Of(std::move(volume)),

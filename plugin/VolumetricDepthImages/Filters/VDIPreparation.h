@@ -15,8 +15,6 @@
 #include "vdi/pipeline/Reports.h"
 #include "vtkVDIImageData.h"
 
-class vtkMultiProcessController;
-
 namespace pv {
 
 /// On several ranks, a function is collective if its comment states it. ParaView's servers allow MPI on one
@@ -73,9 +71,6 @@ class Preparation {
   // last member, so that the thread is joined before the others are destroyed
   std::jthread Worker;
 };
-
-/// Collective: whether `here` is true on all ranks of the controller. Null means this rank alone.
-bool onAllRanks(vtkMultiProcessController* controller, bool here);
 
 }  // namespace pv
 

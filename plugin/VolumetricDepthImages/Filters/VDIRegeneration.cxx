@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "VDISession.h"
 #include "vdi/core/Error.h"
 
 namespace pv {

@@ -1,6 +1,7 @@
 #include "VDISession.h"
 
 #include <mpi.h>
+#include <vtkCommunicator.h>
 #include <vtkMPI.h>
 #include <vtkMPICommunicator.h>
 #include <vtkMultiProcessController.h>
@@ -9,7 +10,6 @@
 #include <mutex>
 
 #include "VDICollective.h"
-#include "VDIVolume.h"
 #include "vdi/core/Error.h"
 
 namespace pv {
@@ -20,6 +20,14 @@ vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller) {
   if (communicator == nullptr || controller->GetNumberOfProcesses() == 1)
     return vdi::comm::Communicator::serial();
   return vdi::comm::Communicator::fromMpi(MPI_Comm_c2f(*communicator->GetMPIComm()->GetHandle()));
+}
+
+bool onAllRanks(vtkMultiProcessController* controller, bool here) {
+  if (controller == nullptr || controller->GetNumberOfProcesses() == 1) return here;
+  const int mine = here ? 1 : 0;
+  int all = 0;
+  controller->AllReduce(&mine, &all, 1, vtkCommunicator::MIN_OP);
+  return all != 0;
 }
 
 bool isServer() {
@@ -44,36 +52,16 @@ bool isWatched(vtkMultiProcessController* controller) {
   return controller != nullptr && controller->HasObserver(CollectiveEntry::event) != 0;
 }
 
-namespace {
-
-struct Existing {
-  std::mutex mutex;
-  std::weak_ptr<vdi::gpu::Device> device;
-  std::weak_ptr<Volumes> volumes;
-};
-
-Existing& existing() {
-  static Existing shared;
-  return shared;
-}
-
-}  // namespace
-
 std::shared_ptr<vdi::gpu::Device> sharedDevice(int localRank) {
-  const std::scoped_lock lock(existing().mutex);
-  std::shared_ptr<vdi::gpu::Device> device = existing().device.lock();
+  static std::mutex mutex;
+  static std::weak_ptr<vdi::gpu::Device> existing;
+  const std::scoped_lock lock(mutex);
+  std::shared_ptr<vdi::gpu::Device> device = existing.lock();
   if (!device || device->isLost()) {
     device = vdi::gpu::Device::create(vdi::gpu::requestFromEnvironment(localRank));
-    existing().device = device;
+    existing = device;
   }
   return device;
-}
-
-std::shared_ptr<Volumes> sharedVolumes() {
-  const std::scoped_lock lock(existing().mutex);
-  std::shared_ptr<Volumes> volumes = existing().volumes.lock();
-  if (!volumes) existing().volumes = volumes = std::make_shared<Volumes>();
-  return volumes;
 }
 
 }  // namespace pv

@@ -1,5 +1,4 @@
-// Objects that the filters of one process share: the Vulkan device, the volumes on it, and the communicator
-// of a VTK controller.
+// Objects that the filters of one process share: the Vulkan device and the communicator of a VTK controller.
 #ifndef VDISession_h
 #define VDISession_h
 
@@ -13,11 +12,12 @@ class vtkMultiProcessController;
 
 namespace pv {
 
-class Volumes;
-
 /// A communicator over a duplicate of the controller's MPI communicator (collective), or over this process
 /// alone if the controller has none, or one process.
 vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller);
+
+/// Collective: whether `here` is true on all ranks of the controller. Null means this rank alone.
+bool onAllRanks(vtkMultiProcessController* controller, bool here);
 
 /// Whether this process belongs to a server, so that another process shows its output.
 bool isServer();
@@ -31,9 +31,6 @@ bool isWatched(vtkMultiProcessController* controller);
 /// The process's device. The first call makes it, and it lives as long as a caller holds it. If the device is
 /// lost, the function makes a new one. Any thread may call it. Throws vdi::Error{DeviceUnavailable}.
 std::shared_ptr<vdi::gpu::Device> sharedDevice(int localRank);
-
-/// The process's volumes, which live as long as a caller holds them. Any thread may call it.
-std::shared_ptr<Volumes> sharedVolumes();
 
 }  // namespace pv
 

@@ -8,7 +8,6 @@
 #include <chrono>
 #include <utility>
 
-#include "VDIPreparation.h"
 #include "VDISession.h"
 #include "VDIValues.h"
 #include "vdi/core/Error.h"
@@ -205,6 +204,15 @@ std::shared_ptr<Volume> Volumes::choose(vtkMultiProcessController* controller, c
   auto created = std::make_shared<Volume>(controller, newIdentity(controller));
   volumes_.push_back(created);
   return created;
+}
+
+std::shared_ptr<Volumes> sharedVolumes() {
+  static std::mutex mutex;
+  static std::weak_ptr<Volumes> existing;
+  const std::scoped_lock lock(mutex);
+  std::shared_ptr<Volumes> volumes = existing.lock();
+  if (!volumes) existing = volumes = std::make_shared<Volumes>();
+  return volumes;
 }
 
 }  // namespace pv

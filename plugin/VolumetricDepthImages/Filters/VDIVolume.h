@@ -150,6 +150,9 @@ class Volumes {
   std::vector<std::weak_ptr<Volume>> volumes_;
 };
 
+/// The process's volumes, which live as long as a caller holds them. Any thread may call it.
+std::shared_ptr<Volumes> sharedVolumes();
+
 }  // namespace pv
 
 #endif
