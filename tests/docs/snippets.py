@@ -201,9 +201,13 @@ def script_in_short(text):
     assert made("*.vdi") == ["vdi_000000.vdi"], made("*.vdi")
 
 
-@tests("paraview", "docs/catalyst-guide.md", "from paraview import catalyst")
+with open(os.path.join(SOURCE, "python_pipelines", "minimal.py")) as file:
+    MINIMAL = file.read()
+
+
+@tests("paraview", "docs/catalyst-guide.md", "image.Resolution = ")
 def script_in_full(text):
-    in_situ(text, 11)
+    in_situ(MINIMAL + text, 11)
     assert made("*.vdi") == ["vdi_000000.vdi", "vdi_000010.vdi"], made("*.vdi")
 
 
@@ -212,7 +216,6 @@ def snippet(start):
     return next(text for _, text in snippets() if text.startswith(start))
 
 
-GUIDE = snippet("from paraview import catalyst")
 EXTRACTOR = snippet("stream = CreateExtractor").replace("8080", "0")
 
 
@@ -221,7 +224,7 @@ STEERED = snippet("stream.Writer.Steer = 1")
 
 @shared
 def streamed():
-    in_situ(GUIDE + EXTRACTOR + STEERED + "assert (stream.Writer.Port, stream.Writer.Steer) == (0, 1)\n")
+    in_situ(MINIMAL + EXTRACTOR + STEERED + "assert (stream.Writer.Port, stream.Writer.Steer) == (0, 1)\n")
 
 
 @tests("paraview", "docs/live.md", "stream = CreateExtractor")
