@@ -105,8 +105,9 @@ void setUpScene() {
   rayEnter = params.first + (grazes ? enter : clamp(enter, first - params.step, first));
   rayLeave = params.first + (grazes ? leave : clamp(leave, last, last + params.step));
   rayLeave = max(rayLeave, rayEnter + 0.001 * params.step);
-  rayBegin = (rayEnter - params.first) / params.step;
-  rayEnd = (rayLeave - params.first) / params.step;
+  // No block has values farther away, so the picture would depend on which block owns the sample.
+  rayBegin = max((rayEnter - params.first) / params.step, middleOf(rayScene.x) - params.reach);
+  rayEnd = min((rayLeave - params.first) / params.step, middleOf(rayScene.y) - 1.0 + params.reach);
 }
 
 // Pages beyond pageCount cost nothing: comparing with a specialisation constant removes them.

@@ -7,6 +7,7 @@
 
 #include "tests/Catch.h"
 #include "tests/Devices.h"
+#include "tests/OpticalScenes.h"
 #include "tests/Scenes.h"
 #include "tests/pipeline/Integral.h"
 #include "tests/pipeline/PictureDifference.h"
@@ -101,6 +102,43 @@ TEST_CASE("region: a box on the lattice shows the volume of the values in it") {
     const auto clipped = generator.renderVolume(camera, function, settings);
     CHECK(test::largestDifference(*clipped, *cropped) < 1.0F);
     settings.region = {};
+  }
+}
+
+TEST_CASE("region: the blocks don't show, however far the outermost samples reach") {
+  // The region ends shortly behind a face between blocks, where a ray's last sample reaches farther than the
+  // block in front has values.
+  const glm::ivec3 size{17, 17, 17};
+  const auto decompose = [&](const glm::ivec3& count) {
+    return test::decompose("turbulence", size, count, Layout::OnOneRank, Joint::SharedPoints, ScalarType::F32,
+                           0, 1);
+  };
+  const auto whole = decompose({1, 1, 1});
+  const auto many = decompose({2, 2, 2});
+  VdiGenerator generator(test::device(), comm::Communicator::serial());
+  generator.setBlocks(whole.mine);
+  const Box bounds = generator.scene().bounds;
+  TransferFunction function = test::threeHues(1.0, 0.1);
+  GenerateSettings settings = test::smallSettings(40, 24);
+  for (const double rate : {0.56, 0.6, 1.0}) {
+    Camera camera = Camera::framing(bounds, {0.1, 0.05, -1.0}, {0.0, 1.0, 0.0});
+    if (rate == 1.0) {  // rays far from the axis take long steps
+      camera.viewAngle = 100.0;
+      camera.position = camera.focalPoint + (camera.position - camera.focalPoint) * 0.4;
+    }
+    settings.samplesPerVoxel = rate;
+    settings.region.box = bounds;
+    for (const double end : {0.54, 0.58, 0.61}) {
+      settings.region.box->lo.z = bounds.lo.z + (1.0 - end) * (bounds.hi.z - bounds.lo.z);
+      generator.setBlocks(whole.mine);
+      const auto expected = generator.renderVolume(camera, function, settings);
+      generator.setBlocks(many.mine);
+      INFO("rate " << rate << ", the nearest " << end);
+      CHECK(test::mostOpaque(*expected) > 0.5F);
+      CHECK(test::largestDifference(*generator.renderVolume(camera, function, settings), *expected) < 1.0F);
+      const reference::RayInputs inputs(generator.scene(), camera, function, settings);
+      CHECK(test::largestDifference(reference::renderVolume(inputs, whole.mine), *expected) < 0.5F);
+    }
   }
 }
 

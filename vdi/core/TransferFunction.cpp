@@ -15,6 +15,7 @@ namespace vdi {
 namespace {
 
 constexpr std::size_t smallestTable = 1024;
+constexpr std::size_t tableOfSteps = 4096;
 constexpr std::size_t largestTable = 16384;
 
 /// Piecewise linear through nodes in ascending x; `valueOf` reads a node's value. Of two nodes at x, the
@@ -47,15 +48,39 @@ bool isShare(double value) {
   return value >= 0.0 && value <= 1.0;
 }
 
-float extinctionOf(double opacity) {
+double extinctionOf(double opacity) {
   if (opacity >= 1.0) return maxExtinction;
-  return std::min(static_cast<float>(-std::log2(1.0 - opacity)), maxExtinction);
+  return std::min(-std::log2(1.0 - opacity), static_cast<double>(maxExtinction));
+}
+
+/// The nodes between which the function changes: it is constant before `first` and beyond `last`.
+struct Changes {
+  std::size_t first;
+  std::size_t last;
+};
+
+template <typename Node, typename ValueOf>
+Changes changesOf(const std::vector<Node>& nodes, ValueOf valueOf) {
+  Changes changes{0, nodes.size() - 1};
+  while (changes.first < changes.last && valueOf(nodes[changes.first]) == valueOf(nodes[changes.first + 1]))
+    ++changes.first;
+  while (changes.last > changes.first && valueOf(nodes[changes.last]) == valueOf(nodes[changes.last - 1]))
+    --changes.last;
+  return changes;
+}
+
+/// The scalars at which the nodes make steps.
+template <typename Node>
+void addSteps(const std::vector<Node>& nodes, const Changes& changes, std::vector<double>& steps) {
+  for (std::size_t i = changes.first; i < changes.last; ++i) {
+    if (nodes[i].x == nodes[i + 1].x) steps.push_back(nodes[i].x);
+  }
 }
 
 /// Smallest nonzero distance between two nodes.
 template <typename Node>
-double closestNodes(const std::vector<Node>& nodes, double soFar) {
-  for (std::size_t i = 1; i < nodes.size(); ++i) {
+double closestNodes(const std::vector<Node>& nodes, const Changes& changes, double soFar) {
+  for (std::size_t i = changes.first + 1; i <= changes.last; ++i) {
     const double distance = nodes[i].x - nodes[i - 1].x;
     if (distance > 0.0) soFar = std::min(soFar, distance);
   }
@@ -92,29 +117,94 @@ void validate(const TransferFunction& transferFunction) {
   }
 }
 
+namespace {
+
+/// Associated colour and extinction at a scalar.
+glm::dvec4 entryAt(const TransferFunction& function, double x) {
+  const double extinction = extinctionOf(function.opacityAt(x));
+  return {function.colorAt(x) * extinction, extinction};
+}
+
+/// The mean of the function over [lo, hi], with the nodes between as breakpoints.
+glm::dvec4 meanOver(const TransferFunction& function, const std::vector<double>& nodes, double lo,
+                    double hi) {
+  glm::dvec4 sum(0.0);
+  double from = lo;
+  const auto add = [&](double to) {
+    // The values just inside: at a step, the function has another value on each side.
+    const double inset = 1e-9 * (to - from);
+    sum += 0.5 * (to - from) * (entryAt(function, from + inset) + entryAt(function, to - inset));
+    from = to;
+  };
+  for (auto node = std::upper_bound(nodes.begin(), nodes.end(), lo); node != nodes.end() && *node < hi;
+       ++node)
+    if (*node > from) add(*node);
+  add(hi);
+  return sum / (hi - lo);
+}
+
+}  // namespace
+
 TransferTable bake(const TransferFunction& transferFunction) {
   validate(transferFunction);
+  const auto& [colors, opacities, unitDistance] = transferFunction;
+  const Changes hues = changesOf(colors, [](const ColorNode& node) { return node.color; });
+  const Changes opaque = changesOf(opacities, [](const OpacityNode& node) { return node.opacity; });
   TransferTable table;
-  table.unitDistance = transferFunction.unitDistance;
-  table.min = std::min(transferFunction.colors.front().x, transferFunction.opacities.front().x);
-  table.max = std::max(transferFunction.colors.back().x, transferFunction.opacities.back().x);
+  table.unitDistance = unitDistance;
+  table.min = std::min(colors.front().x, opacities.front().x);
+  table.max = std::max(colors.back().x, opacities.back().x);
+  const double closest = closestNodes(opacities, opaque, closestNodes(colors, hues, table.max - table.min));
+  const auto resolves = [&](std::size_t size) {
+    return closest * static_cast<double>(size - 1) >= 2.0 * (table.max - table.min);
+  };
+  if (!resolves(largestTable)) {
+    // The table leaves out where the function is constant, or transparent, to its end.
+    table.min = opacities[opaque.first].x;
+    table.max = opacities[opaque.last].x;
+    if (opacities.front().opacity > 0.0) table.min = std::min(table.min, colors[hues.first].x);
+    if (opacities.back().opacity > 0.0) table.max = std::max(table.max, colors[hues.last].x);
+  }
+  std::vector<double> steps;
+  addSteps(colors, hues, steps);
+  addSteps(opacities, opaque, steps);
+  std::sort(steps.begin(), steps.end());
   if (!(table.max > table.min)) {
-    // A single scalar. Two nodes there are a step, which lies between two neighbouring entries.
-    const double half = std::max(std::abs(table.min), 1e-30) * 1e-6;
+    // A single scalar, with a step or without. Values are floats, so the table is much wider than their
+    // rounding errors.
+    const double half = std::max(std::abs(table.min), 1e-30) * 1e-3;
     table.min -= half;
     table.max += half;
+  } else if (std::binary_search(steps.begin(), steps.end(), table.min)) {
+    table.min -= 4.0 / smallestTable * (table.max - table.min);  // the first entry lies in front of the step
   }
-  const double range = table.max - table.min;
-  const double closest =
-      closestNodes(transferFunction.opacities, closestNodes(transferFunction.colors, range));
-  std::size_t size = smallestTable;
-  while (size < largestTable && closest * static_cast<double>(size - 1) < 2.0 * range) size *= 2;
+  std::size_t size = steps.empty() ? smallestTable : tableOfSteps;
+  while (size < largestTable && !resolves(size)) size *= 2;
   table.entries.resize(size);
+  const double range = table.max - table.min;
+  const double perEntry = range / static_cast<double>(size - 1);
+  const bool isFine = resolves(size);
+  std::vector<double> nodes;
+  if (!isFine) {
+    for (const ColorNode& node : colors) nodes.push_back(node.x);
+    for (const OpacityNode& node : opacities) nodes.push_back(node.x);
+    std::sort(nodes.begin(), nodes.end());
+  }
   for (std::size_t i = 0; i < size; ++i) {
-    const double x = table.min + range * static_cast<double>(i) / static_cast<double>(size - 1);
-    const float extinction = extinctionOf(transferFunction.opacityAt(x));
-    const glm::vec3 color = glm::vec3(transferFunction.colorAt(x)) * extinction;
-    table.entries[i] = {color.r, color.g, color.b, extinction};
+    double x = table.min + range * static_cast<double>(i) / static_cast<double>(size - 1);
+    glm::vec4 entry;
+    if (isFine) {
+      // Of two nodes at a scalar, the later one counts. So the ramp that makes a step ends at or before it:
+      // the entry before has the value behind the step.
+      const auto step = std::upper_bound(steps.begin(), steps.end(), x);
+      if (step != steps.end() && *step < x + perEntry) x = *step;
+      entry = entryAt(transferFunction, x);
+    } else {
+      // Features narrower than an entry count by their mean, so that no ray misses them.
+      entry = meanOver(transferFunction, nodes, std::max(x - 0.5 * perEntry, table.min),
+                       std::min(x + 0.5 * perEntry, table.max));
+    }
+    table.entries[i] = {entry.r, entry.g, entry.b, entry.a};
   }
   return table;
 }

@@ -30,7 +30,8 @@ struct RayInputs {
   DepthLattice lattice;
   TransferTable table;
   GenerateSettings settings;
-  bool slabs = true;  // samplesAreSlabs
+  bool slabs = true;   // samplesAreSlabs
+  float reach = 1.0F;  // outermostReach
   SlabTable slabTable;
   std::vector<Isosurface> isosurfaces;  // isosurfacesOf
 
