@@ -393,13 +393,68 @@ TEST_CASE("transfer functions are piecewise linear, with steps, constant outside
   CHECK(table.visible(0.5, 0.6));
   function.opacities = {{0.0, 0.0}, {1.0, 0.0}, {1.0001, 1.0}, {1.0002, 0.0}, {2.0, 0.0}};
   const TransferTable narrow = bake(function);
-  CHECK(narrow.entries.size() == 16384);
   CHECK(narrow.visible(0.9, 1.1));
+  CHECK(narrow.lookup(1.0001).extinction == maxExtinction);
   CHECK_FALSE(narrow.visible(0.1, 0.9));
   function.opacities = {{1.0, 0.0}, {0.0, 1.0}};
   CHECK_THROWS_AS(bake(function), Error);
   function.opacities = {{0.0, 1.5}};
   CHECK_THROWS_AS(bake(function), Error);
+}
+
+TEST_CASE("transfer functions: a step has the value behind it at its scalar, and the one in front before") {
+  const auto opacityAt = [](const TransferTable& table, double x) {
+    return 1.0 - std::exp2(-table.lookup(x).extinction);
+  };
+  TransferFunction function;
+  function.colors = {{0.5, {1.0, 0.5, 0.0}}};
+  // At the lowest scalar of all, where colours have one node, two, or a step of their own.
+  function.opacities = {{0.5, 0.0}, {0.5, 0.3}, {1.0, 0.3}};
+  for (const std::vector<ColorNode>& colors :
+       {function.colors, std::vector<ColorNode>{{0.5, {1.0, 0.5, 0.0}}, {1.0, {0.0, 0.5, 0.0}}},
+        std::vector<ColorNode>{{0.5, {1.0, 0.0, 0.0}}, {0.5, {0.0, 1.0, 0.0}}, {1.0, {0.0, 1.0, 0.0}}}}) {
+    function.colors = colors;
+    const TransferTable table = bake(function);
+    for (const double x : {-9.0, 0.0, 0.49}) CHECK(table.lookup(x).extinction == 0.0F);
+    for (const double x : {0.5, 0.51, 0.9, 7.0}) CHECK(opacityAt(table, x) == Approx(0.3));
+  }
+  // Labels: values exactly at steps, wherever these lie among the entries.
+  function.colors = {{0.0, {1.0, 1.0, 1.0}}};
+  function.opacities = {{0.0, 0.1},  {20.0, 0.1},  {20.0, 0.4}, {61.0, 0.4},
+                        {61.0, 0.2}, {100.0, 0.2}, {100.0, 0.6}};
+  const TransferTable labels = bake(function);
+  for (const auto& [x, opacity] : std::vector<std::pair<double, double>>{
+           {0.0, 0.1}, {19.9, 0.1}, {20.0, 0.4}, {60.9, 0.4}, {61.0, 0.2}, {99.9, 0.2}, {100.0, 0.6}}) {
+    INFO(x);
+    CHECK(opacityAt(labels, x) == Approx(opacity).epsilon(1e-4));
+  }
+  // One scalar, as floats have it.
+  for (const double at : {100.0, -7.3, 0.0}) {
+    function.opacities = {{at, 0.0}, {at, 0.5}};
+    const TransferTable one = bake(function);
+    CHECK(opacityAt(one, at) == Approx(0.5));
+    CHECK(one.max - one.min > 1e-4 * std::abs(at));
+  }
+}
+
+TEST_CASE("transfer functions: nothing is too narrow for the table") {
+  // A peak beside a far outlier, which nothing shows, and then one that is shown.
+  TransferFunction function;
+  function.colors = {{0.0, {1.0, 0.0, 0.0}}, {1e6, {0.0, 0.0, 1.0}}};
+  function.opacities = {{0.0, 0.0}, {20.0, 0.0}, {22.0, 0.5}, {24.0, 0.0}, {1e6, 0.0}};
+  const TransferTable alone = bake(function);
+  CHECK(1.0 - std::exp2(-alone.lookup(22.0).extinction) == Approx(0.5).epsilon(1e-3));
+  CHECK(alone.lookup(1e5).extinction == 0.0F);
+  function.opacities.back().opacity = 0.01;
+  const TransferTable both = bake(function);
+  const double perEntry = (both.max - both.min) / static_cast<double>(both.entries.size() - 1);
+  double sum = 0.0;
+  for (std::size_t i = 0; i * perEntry < 1000.0; ++i) sum += both.entries[i].extinction * perEntry;
+  double exact = 0.0;
+  constexpr int steps = 4000;
+  for (int i = 0; i < steps; ++i)
+    exact += 4.0 / steps * -std::log2(1.0 - function.opacityAt(20.0 + 4.0 * (i + 0.5) / steps));
+  CHECK(sum == Approx(exact).epsilon(0.15));
 }
 
 TEST_CASE("who owns what: points to the last point, cells whole, ghosts never") {

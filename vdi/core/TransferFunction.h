@@ -52,8 +52,8 @@ struct TransferTableEntry {
 inline constexpr float maxExtinction = 65504.0F;  // the largest half float
 
 /// The function sampled at `entries.size()` evenly spaced scalars from `min` to `max`, linear in between,
-/// constant outside. A
-/// *position* in the table is a scalar in units of entries: 0 is `min`, entries.size() - 1 is `max`.
+/// constant outside. A *position* in the table is a scalar in units of entries: 0 is `min`, entries.size() -
+/// 1 is `max`.
 struct TransferTable {
   double min = 0.0;
   double max = 1.0;  // > min
@@ -74,8 +74,9 @@ struct TransferTable {
 };
 
 /// Samples the function. The size is a power of two from 1024 to 16384, large enough for two entries between
-/// neighbouring nodes where possible; otherwise an entry is the mean of the function around it. At a step,
-/// the table has the value behind it from the step's scalar on, and in front of it up to an entry before.
+/// neighbouring nodes where possible. Where it isn't, the range leaves out the ends at which the function is
+/// constant or transparent; if that isn't enough, an entry is the mean of the function around it. From the
+/// scalar of a step on, the table has the values behind the step; up to one entry before, those in front.
 TransferTable bake(const TransferFunction& transferFunction);
 
 }  // namespace vdi
