@@ -121,7 +121,7 @@ def make_view(size, position, focal_point, parallel_scale=None):
 def paraview_volume(source, view, association, name, unit_distance, keep_range=False, **properties):
     """ParaView's own volume rendering, unshaded unless `properties` of the representation say otherwise, as an array of
     [rows][columns][3] bytes from the top. Stretches the colour map over the data's range, unless `keep_range`."""
-    position, focal_point, scale = list(view.CameraPosition), list(view.CameraFocalPoint), view.CameraParallelScale
+    size, camera = list(view.ViewSize), [list(view.CameraPosition), list(view.CameraFocalPoint), view.CameraParallelScale]
     colors, opacity = simple.GetColorTransferFunction(name), simple.GetOpacityTransferFunction(name)
     points = list(colors.RGBPoints), list(opacity.Points)
     representation = simple.Show(source, view)
@@ -135,10 +135,11 @@ def paraview_volume(source, view, association, name, unit_distance, keep_range=F
         setattr(representation, key, value)
     simple.HideScalarBarIfNotNeeded(simple.GetColorTransferFunction(name), view)
     path = os.path.join(OUTPUT, "paraview_volume_{}.png".format(os.getpid()))  # tests run side by side
-    simple.Render(view)  # the first picture of a view moves its camera
-    view.CameraPosition, view.CameraFocalPoint, view.CameraParallelScale = position, focal_point, scale
-    simple.Render(view)
-    simple.SaveScreenshot(path, view, ImageResolution=view.ViewSize)
+    view.ViewSize = [64, 36]
+    simple.Render(view)  # the first picture of a view moves its camera; a small one is quick
+    view.ViewSize = size
+    view.CameraPosition, view.CameraFocalPoint, view.CameraParallelScale = camera
+    simple.SaveScreenshot(path, view, ImageResolution=size)
     seen = read_png(path)
     os.remove(path)
     return seen
