@@ -1,6 +1,6 @@
 """The recipes of docs/recipes.md: each has the text of a file in python_pipelines/, which runs.
 
-Several recipes share a run. The tests run the JSON files with fewer pixels. The environment has PVBATCH,
+Several recipes share a run. The tests run the recipes with fewer pixels. The environment has PVBATCH,
 PVPYTHON, MPIEXEC, SCREEN (what runs a command with a display), PV_PLUGIN_CONFIG_FILE and PYTHONPATH.
 """
 
@@ -60,10 +60,18 @@ def folder_of(name):
     return path
 
 
+def smaller(name):
+    """Copies a script to the current folder with fewer pixels, and returns the copy's path."""
+    text = text_of(path_of(name))
+    assert text.count("640, 360") == 1, "%s has %d resolutions of 640, 360" % (name, text.count("640, 360"))
+    write(name, text.replace("640, 360", "160, 90"))
+    return os.path.abspath(name)
+
+
 @functools.cache
 def saved_state():
     os.chdir(folder_of("state"))
-    run(os.environ["PVBATCH"], PARAVIEW, "state", path_of("save_state.py"))
+    run(os.environ["PVBATCH"], PARAVIEW, "state", smaller("save_state.py"))
     return os.getcwd()
 
 
@@ -94,8 +102,9 @@ def of_documents(name):
 @functools.cache
 def run_scripts():
     """The scripts and the saved state, in one simulation on two ranks."""
-    scripts = [path_of("picture.py"), path_of("live.py"), os.path.join(saved_state(), "state.py")]
+    state = os.path.join(saved_state(), "state.py")
     os.chdir(folder_of("scripts"))
+    scripts = [smaller("picture.py"), smaller("live.py"), state]
     run_on(2, sys.executable, SIMULATION, "scripts", *scripts)
     return os.getcwd()
 
@@ -194,7 +203,7 @@ def state():
 
 def of_grid(name):
     os.chdir(folder_of(name))
-    run_on(2, sys.executable, SIMULATION, "grid", path_of(name))
+    run_on(2, sys.executable, SIMULATION, "grid", smaller(name))
     return os.getcwd()
 
 
@@ -205,7 +214,7 @@ def unstructured():
 
 def of_part(name):
     os.chdir(folder_of(name))
-    run_on(3, sys.executable, path_of(name))
+    run_on(3, sys.executable, smaller(name))
     return os.getcwd()
 
 
