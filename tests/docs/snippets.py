@@ -1,8 +1,8 @@
 """Runs or compiles the snippets of README.md and the guides; recipes.py those of docs/recipes.md.
 
 The tests add the surroundings that a document's text describes, such as the simulation's variables. They
-change the snippets only in one port, which another program may hold, and in one number of steps. Snippets
-of which one builds on another share a run, because ParaView takes seconds to start and to draw.
+change the snippets only in one port, which another program may hold, in one number of steps, and in the
+number of pixels. Snippets share runs where they can, because ParaView takes seconds to start and to draw.
 
 The environment has MPICC, MPIFORT, PVBATCH, PV_PLUGIN_CONFIG_FILE and PYTHONPATH.
 """
@@ -177,6 +177,25 @@ def read_in_python(text):
     run(sys.executable, "-c", text + "assert turned.shape == (720, 1280, 4), turned.shape\n")
 
 
+def snippet(start):
+    """The snippet that begins so."""
+    return next(text for _, text in snippets() if text.startswith(start))
+
+
+def changed(text, old, new):
+    """The text with `new` in the place of `old`, which it has once."""
+    assert text.count(old) == 1, "%d times %r in:\n%s" % (text.count(old), old, text)
+    return text.replace(old, new)
+
+
+SMALL = "[160, 90]"
+GUIDE = snippet("image.Resolution = ")
+EXTRACTOR = snippet("stream = CreateExtractor")
+STEERED = snippet("stream.Writer.Steer = 1")
+with open(os.path.join(SOURCE, "python_pipelines", "minimal.py")) as file:
+    MINIMAL = file.read()
+
+
 def in_situ(script, steps=1):
     """Runs a script in a simulation of the cells of a cube."""
     write("script.py", script)
@@ -195,36 +214,23 @@ with Catalyst(MPI.COMM_WORLD, ["script.py"]) as catalyst:
     run(sys.executable, "simulation.py", env=environment)
 
 
+@shared
+def streamed():
+    """The guide's changes of minimal.py, which streams its VDIs as well."""
+    in_situ(MINIMAL + changed(GUIDE, "[1280, 720]", SMALL) + changed(EXTRACTOR, "8080", "0") + STEERED
+            + "assert (stream.Writer.Port, stream.Writer.Steer) == (0, 1)\n", 11)
+
+
 @tests("paraview", "README.md", 'image = VolumetricDepthImage(Input=TrivialProducer')
 def script_in_short(text):
-    in_situ("from paraview.simple import *\n" + text)
+    in_situ("from paraview.simple import *\n" + text + "image.Resolution = " + SMALL + "\n")
     assert made("*.vdi") == ["vdi_000000.vdi"], made("*.vdi")
 
 
-with open(os.path.join(SOURCE, "python_pipelines", "minimal.py")) as file:
-    MINIMAL = file.read()
-
-
 @tests("paraview", "docs/catalyst-guide.md", "image.Resolution = ")
-def script_in_full(text):
-    in_situ(MINIMAL + text, 11)
+def script_in_full(_):
+    os.chdir(streamed())
     assert made("*.vdi") == ["vdi_000000.vdi", "vdi_000010.vdi"], made("*.vdi")
-
-
-def snippet(start):
-    """The snippet that begins so."""
-    return next(text for _, text in snippets() if text.startswith(start))
-
-
-EXTRACTOR = snippet("stream = CreateExtractor").replace("8080", "0")
-
-
-STEERED = snippet("stream.Writer.Steer = 1")
-
-
-@shared
-def streamed():
-    in_situ(MINIMAL + EXTRACTOR + STEERED + "assert (stream.Writer.Port, stream.Writer.Steer) == (0, 1)\n")
 
 
 @tests("paraview", "docs/live.md", "stream = CreateExtractor")
@@ -268,21 +274,32 @@ def pvbatch(script):
 
 
 WRITING = snippet("from paraview.simple import *\nLoadDistributed")
+LOADING = snippet("LoadDistributedPlugin(")
 SHOWING = snippet("reader = OpenDataFile")
 LOOKING = snippet("reader.SMProxy.UpdatePropertyInformation()")
+STREAM = snippet("stream = VDIStream(URL=link)")
 
 
 @shared
 def written():
-    pvbatch(WRITING)
+    pvbatch(changed(WRITING, "image.CameraPosition", "image.Resolution = " + SMALL + "\nimage.CameraPosition"))
 
 
 @shared
 def looked_at():
-    """The file that README.md's script writes, shown by another one."""
+    """The file that README.md's script writes, and a server's VDI, shown by a script of a client."""
     shutil.copy(os.path.join(written(), "wavelet.vdi"), ".")
-    loading = "".join(WRITING.splitlines(True)[:2])
-    pvbatch(loading + SHOWING + LOOKING + "assert list(view.CameraPosition) == [60, 45, 75]\n")
+    vdi("--field", "sphere", "--size", "16x16x16")
+    command = [TOOL, "serve", "--finished", "made.vdi"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            pvbatch("from paraview.simple import *\n" + LOADING + "VolumetricDepthImage(Input=Wavelet())\n"
+                    + "CreateRenderView(ViewSize=" + SMALL + ")\n"
+                    + SHOWING + LOOKING + "assert list(view.CameraPosition) == [60, 45, 75]\n"
+                    + "link = %r\n" % server.stdout.readline().strip()
+                    + STREAM + "assert stream.GetDataInformation().GetNumberOfPoints() > 0\n")
+        finally:
+            server.terminate()
 
 
 @tests("paraview", "README.md", "from paraview.simple import *\nLoadDistributedPlugin")
@@ -292,8 +309,8 @@ def script_with_filter(_):
 
 
 @tests("paraview", "docs/user-guide.md", "LoadDistributedPlugin(")
-def plugin_of_a_client(text):
-    pvbatch("from paraview.simple import *\n" + text + "VolumetricDepthImage(Input=Wavelet())\n")
+def plugin_of_a_client(_):
+    looked_at()
 
 
 @tests("paraview", "docs/user-guide.md", "reader = OpenDataFile")
@@ -308,18 +325,8 @@ def own_viewpoint(_):
 
 
 @tests("paraview", "docs/live.md", "stream = VDIStream(URL=link)")
-def stream_source(text):
-    vdi("--field", "sphere", "--size", "16x16x16")
-    command = [TOOL, "serve", "--finished", "made.vdi"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
-        try:
-            pvbatch("""from paraview.simple import *
-LoadDistributedPlugin("VolumetricDepthImages", ns=globals())
-link = %r
-%sassert stream.GetDataInformation().GetNumberOfPoints() > 0
-""" % (server.stdout.readline().strip(), text))
-        finally:
-            server.terminate()
+def stream_source(_):
+    looked_at()
 
 
 main()
