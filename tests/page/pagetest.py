@@ -2,6 +2,7 @@
 
 Their arguments: VDI CHROMIUM FOLDER; pictures are left in the folder."""
 import io
+import itertools
 import json
 import math
 import os
@@ -20,6 +21,7 @@ VDI, CHROMIUM, PICTURES = map(os.path.abspath, sys.argv[1:4])
 os.makedirs(PICTURES, exist_ok=True)
 WIDTH, HEIGHT = 192, 108
 failures = []
+numbers = itertools.count()  # of pictures that vdi render makes
 
 
 def check(holds, what):
@@ -72,18 +74,31 @@ def shown(browser, name=None):
     return images.imread(io.BytesIO(browser.screenshot(path)))[..., :3]
 
 
-def rendered(file, camera, reconstruction="sheared"):
-    """The picture that vdi render makes of a file from the page's camera."""
+def rendering(file, camera, reconstruction="sheared"):
+    """Starts vdi render of a file from the page's camera. Returns a function that waits for its picture."""
     words = {"position": camera["position"], "focal_point": camera["focalPoint"], "view_up": camera["viewUp"]}
     if camera["parallel"]:
         words.update(parallel_scale=camera["parallelScale"])
     else:
         words.update(view_angle=camera["viewAngle"])
-    with open("camera.json", "w", encoding="utf-8") as text:
+    name = f"expected_{next(numbers)}"
+    with open(f"{name}.json", "w", encoding="utf-8") as text:
         json.dump(words, text)
-    vdi("render", file, "-o", "expected.png", "--camera", "camera.json", "--resolution", f"{WIDTH}x{HEIGHT}",
-        "--reconstruction", reconstruction)
-    return images.imread("expected.png")[..., :3]
+    command = [VDI, "render", file, "-o", f"{name}.png", "--camera", f"{name}.json", "--resolution", f"{WIDTH}x{HEIGHT}",
+               "--reconstruction", reconstruction]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    def picture():
+        if process.wait(120) != 0:
+            raise RuntimeError(f"{' '.join(command)}: status {process.returncode}")
+        return images.imread(f"{name}.png")[..., :3]
+
+    return picture
+
+
+def rendered(*words):
+    """The picture that vdi render makes of a file from the page's camera."""
+    return rendering(*words)()
 
 
 def compare(what, got, expected, least=0.995):
