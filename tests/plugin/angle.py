@@ -2,7 +2,6 @@
 both pvpython, which has windows, and pvbatch."""
 
 import os
-import subprocess
 
 import numpy as np
 import pvtest
@@ -13,11 +12,9 @@ SIZE, CENTER, CAMERA = [320, 240], [0.5, 0.5, 0.5], [0.5, 0.5, 4.0]
 
 
 def make(name, *options):
-    path = os.path.join(pvtest.OUTPUT, name)
-    subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "--size", "24x24x24", "--resolution", "120x90",
-                    "--focal-point", *map(str, CENTER), "--view-up", "0", "1", "0", "-o", path] + list(options), check=True,
-                   stdout=subprocess.DEVNULL)
-    return simple.OpenDataFile(path)
+    return simple.OpenDataFile(pvtest.make_vdi(
+        name, "--field", "turbulence", "--size", "24x24x24", "--resolution", "120x90", "--focal-point", *map(str, CENTER),
+        "--view-up", "0", "1", "0", *options))
 
 
 def turned(degrees, elevation=0, render=simple.Render):
@@ -34,9 +31,7 @@ def interactive(view):
 
 
 def screenshot(name):
-    path = os.path.join(pvtest.OUTPUT, "angle_{}.png".format(name))
-    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
-    return pvtest.read_png(path)
+    return pvtest.screenshot(view, "angle_{}.png".format(name), SIZE)
 
 
 def said(degrees):

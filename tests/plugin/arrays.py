@@ -2,14 +2,11 @@
 
 import gc
 import os
-import sys
 
 import numpy as np
-
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
-from paraview import servermanager  # noqa: E402
-from paraview.modules.vtkRemotingServerManager import vtkSMProxyManager, vtkSMUndoStack, vtkSMUndoStackBuilder  # noqa: E402
+from paraview import servermanager
+from paraview.modules.vtkRemotingServerManager import vtkSMProxyManager, vtkSMUndoStack, vtkSMUndoStackBuilder
+from pvtest import *  # noqa: F403
 
 SIZE = [96, 72]
 
@@ -54,14 +51,6 @@ def range_of(proxy):
     return [round(x, 4) for x in list(proxy.RGBPoints[0::4])[::len(proxy.RGBPoints) // 4 - 1]]
 
 
-def shown_picture(view):
-    path = os.path.join(OUTPUT, "arrays_{}.png".format(os.getpid()))
-    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
-    seen = read_png(path)
-    os.remove(path)
-    return seen
-
-
 def saved_map(image, name):
     """A reader of the file that Save Data writes."""
     path = os.path.join(OUTPUT, name)
@@ -97,7 +86,7 @@ check(image.LookupTable == simple.GetColorTransferFunction("temperature"), "anot
 check(range_of(image.LookupTable) == [1000, 2000],
       "another array's map has that array's range: %s" % range_of(image.LookupTable))
 simple.Render(view)
-on_screen = shown_picture(view)
+on_screen = screenshot(view, None, SIZE)
 check(np.unique(on_screen.reshape(-1, 3), axis=0).shape[0] > 50, "another array isn't shown as a box of one colour")
 write_png("arrays_temperature.png", on_screen)
 expected = fresh_picture(ball, "temperature", view, ScalarOpacityUnitDistance=image.ScalarOpacityUnitDistance)

@@ -1,15 +1,8 @@
 """Maximum and minimum intensities and isosurfaces against ParaView's own pictures, which the first update takes over; VDIs
 refuse them."""
 
-import os
-import sys
-
 import numpy as np
-
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
-from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
-from vtkmodules.vtkCommonDataModel import vtkImageData  # noqa: E402
+from pvtest import *  # noqa: F403
 
 SHAPE, SPACING = (50, 70, 60), [1.2, 1.0, 1.5]
 UNIT = 7.0  # no mode but Composite depends on it
@@ -18,28 +11,7 @@ UNIT = 7.0  # no mode but Composite depends on it
 def waves_source(name, as_cells):
     z, y, x = np.meshgrid(*[np.arange(n) * s for n, s in zip(SHAPE, SPACING[::-1])], indexing="ij")
     values = 125 + 125 * np.sin(0.15 * x + np.sin(0.12 * y)) * np.cos(0.11 * z + 0.05 * x) * np.cos(0.09 * y)
-    image = vtkImageData()
-    image.SetDimensions(*[n + (1 if as_cells else 0) for n in SHAPE[::-1]])
-    image.SetSpacing(*SPACING)
-    array = numpy_to_vtk(values.astype(np.float32).ravel(), deep=True)
-    array.SetName(name)
-    (image.GetCellData() if as_cells else image.GetPointData()).SetScalars(array)
-    producer = simple.TrivialProducer()
-    producer.GetClientSideObject().SetOutput(image)
-    producer.UpdatePipeline()
-    return producer, np.array(image.GetBounds()).reshape(3, 2).mean(axis=1)
-
-
-said = []
-
-
-def note(caller, event, message):
-    said.append(message)
-
-
-note.CallDataType = "string0"
-for event in ("ErrorEvent", "WarningEvent"):
-    vtkOutputWindow.GetInstance().AddObserver(event, note)
+    return source_of_values(values.astype(np.float32), name, SPACING, as_cells=as_cells)
 
 
 def set_blend(representation, number, values):
@@ -93,12 +65,13 @@ for mode in ("Maximum Intensity", "Minimum Intensity", "Isosurface"):
     image.BlendMode = "Composite"  # ends the failure of the mode before, which is said once
     image.UpdatePipeline()
     image.BlendMode = mode
-    said.clear()
-    image.UpdatePipeline()
+    with Messages("ErrorEvent", "WarningEvent") as said:
+        image.UpdatePipeline()
     about = [message for message in said if "composite blending alone" in message]
     check(len(about) == 1 and len(said) == 1 and "Picture Only" in about[0],
           "%s: a VDI refuses it in one message: %s" % (mode, " | ".join(said)))
 image.BlendMode = "Composite"
-said.clear()
-check(picture(image).max() > 100 and not said, "Composite makes a VDI again after the other modes")
+with Messages("ErrorEvent", "WarningEvent") as said:
+    seen = picture(image)
+check(seen.max() > 100 and not said, "Composite makes a VDI again after the other modes")
 finish()

@@ -1,14 +1,10 @@
 """Filters of one input share its volume: another camera costs no upload and next to no memory, its VDI is that of a filter
 alone, and what one of them does leaves the others' as they are. On any number of ranks. The times are this machine's."""
 
-import os
-import sys
 import time
 
 import numpy as np
-
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
+from pvtest import *  # noqa: F403
 
 CAMERAS = [[140, 45, 75], [60, 120, -90], [-20, 30, 150]]
 ARRAYS = ["VDI.codes", "VDI.offsets", "VDI.parameters"]

@@ -3,14 +3,11 @@ nothing. relay.py counts what goes over the socket."""
 
 import os
 import subprocess
-import sys
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-
-import pvtest  # noqa: E402
-import server  # noqa: E402
-from paraview import simple  # noqa: E402
-from pvtest import check  # noqa: E402
+import pvtest
+import server
+from paraview import simple
+from pvtest import check
 
 SIZE, CAMERA, CENTER = [320, 240], [2.2, 1.9, 2.4], [0.5, 0.5, 0.5]
 LOG = os.path.join(pvtest.OUTPUT, "client_server.log")
@@ -46,12 +43,6 @@ class Session:
         return int(self.relay.stdout.readline())
 
 
-def screenshot(view, name):
-    path = os.path.join(pvtest.OUTPUT, name)
-    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
-    return pvtest.read_png(path)
-
-
 def show(make_source, name):
     """A view of a VDI with a sphere in it, from beside its viewpoint."""
     view = pvtest.make_view(SIZE, CAMERA, CENTER)
@@ -61,7 +52,7 @@ def show(make_source, name):
     simple.Render(view)
     view.CameraPosition, view.CameraFocalPoint = [2.7, 1.4, 1.9], CENTER
     simple.Render(view)
-    return view, screenshot(view, name)
+    return view, pvtest.screenshot(view, name, SIZE)
 
 
 def generated(view):
@@ -92,7 +83,7 @@ path = os.path.join(pvtest.OUTPUT, "client_server.vdi")
 view, expected = show(generated, "client_server_alone.png")
 simple.SaveData(path, proxy=view.Representations[0].Input)
 orbit(view)
-turned = screenshot(view, "client_server_alone_turned.png")
+turned = pvtest.screenshot(view, "client_server_alone_turned.png", SIZE)
 check(expected.std() > 20 and pvtest.ssim(expected, turned) < 0.95, "the picture shows something, and orbiting changes it")
 
 with Session() as session:
@@ -106,7 +97,7 @@ with Session() as session:
         print("a VDI {} on the server: SSIM {:.4f} to the same without a server".format(what, likeness))
         check(likeness > 0.99, "a VDI that is {} on the server is shown as without one".format(what))
         shown = bytes_of_orbit(session, view)
-        check(pvtest.ssim(screenshot(view, "client_server_turned.png"), turned) > 0.99, "orbiting turns the VDI")
+        check(pvtest.ssim(pvtest.screenshot(view, "client_server_turned.png", SIZE), turned) > 0.99, "orbiting turns the VDI")
         place = list(view.CameraPosition)
         view.CameraPosition = [0.6, 0.5, 0.4]
         simple.Render(view)
@@ -128,7 +119,7 @@ with Session() as session:
     simple.Show(image, view)
     simple.Render(view)
     view.CameraPosition, view.CameraFocalPoint = CAMERA, CENTER
-    alone = screenshot(view, "client_server_no_volume.png")
+    alone = pvtest.screenshot(view, "client_server_no_volume.png", SIZE)
     simple.Hide(image, view)
     for order in ("volume first", "VDI first"):
         view = pvtest.make_view(SIZE, CAMERA, CENTER)
@@ -139,15 +130,15 @@ with Session() as session:
                 simple.Show(image, view)
             simple.Render(view)
             view.CameraPosition, view.CameraFocalPoint = CAMERA, CENTER
-        picture = screenshot(view, "client_server_{}.png".format(order.replace(" ", "_")))
+        picture = pvtest.screenshot(view, "client_server_{}.png".format(order.replace(" ", "_")), SIZE)
         check("beside a volume" in pvtest.message_in(view), order + ": beside a volume of the server there is a message")
         simple.Hide(image, view)
-        volume = screenshot(view, "client_server_volume.png")
+        volume = pvtest.screenshot(view, "client_server_volume.png", SIZE)
         top = slice(SIZE[1] // 3)  # beside the message
         check(volume.std() > 20 and pvtest.ssim(picture[top], volume[top]) > 0.95, order + ": the volume is seen")
         simple.Show(image, view)
         simple.Hide(image.Input, view)
-        picture = screenshot(view, "client_server_volume_hidden.png")
+        picture = pvtest.screenshot(view, "client_server_volume_hidden.png", SIZE)
         check(pvtest.message_in(view) == "" and pvtest.ssim(picture, alone) > 0.99,
               order + ": without the volume, the VDI is seen again")
 

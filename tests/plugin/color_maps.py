@@ -2,16 +2,13 @@
 optical model in double precision (optical.py), and some of them against ParaView's own Volume. The argument N leaves out all
 but each Nth of the maps that ParaView offers."""
 
-import os
 import sys
 import time
 
 import numpy as np
-
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from paraview.modules.vtkRemotingViews import vtkSMTransferFunctionPresets  # noqa: E402
-from pvtest import *  # noqa: E402,F403
-import optical  # noqa: E402
+import optical
+from paraview.modules.vtkRemotingViews import vtkSMTransferFunctionPresets
+from pvtest import *  # noqa: F403
 
 SIZE = [40, 30]
 UNIT_DISTANCE = 3.0
@@ -32,15 +29,7 @@ class Scene:
         self.name, self.low, self.high = name, low, high
         if values is None:
             values = (low + (high - low) * field()).astype(kind)
-        image = vtkImageData()
-        image.SetDimensions(*values.shape[::-1])
-        array = numpy_to_vtk(values.ravel(), deep=True)
-        array.SetName(name)
-        image.GetPointData().SetScalars(array)
-        self.source = simple.TrivialProducer()
-        self.source.GetClientSideObject().SetOutput(image)
-        self.source.UpdatePipeline()
-        center = (np.array(values.shape[::-1]) - 1) / 2
+        self.source, center = source_of_values(values, name)
         self.view = make_view(SIZE, list(center + [17.0, 13.0, 19.0]), list(center), parallel_scale)
         self.colors = simple.GetColorTransferFunction(name)
         self.opacity = simple.GetOpacityTransferFunction(name)

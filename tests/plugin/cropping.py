@@ -1,15 +1,8 @@
 """Cropped volumes against ParaView's own, whose box the first update takes; clipping planes; missing blend modes."""
 
-import os
-import sys
-
 import numpy as np
-
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
-from vtkmodules.vtkCommonDataModel import vtkImageData  # noqa: E402
-from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
-import vtkmodules.vtkRenderingVolume  # noqa: E402,F401  # so that mappers of volumes have their methods
+import vtkmodules.vtkRenderingVolume  # noqa: F401  # so that mappers of volumes have their methods
+from pvtest import *  # noqa: F403
 
 # Values are [z][y][x] of cells, because VTK misplaces the faces of cropped point data by up to half a voxel.
 SHAPE, SPACING, ORIGIN = (50, 70, 60), [1.2, 1.0, 1.5], [-10, 5, 20]
@@ -18,17 +11,7 @@ SHAPE, SPACING, ORIGIN = (50, 70, 60), [1.2, 1.0, 1.5], [-10, 5, 20]
 def waves_source():
     z, y, x = np.meshgrid(*[np.arange(n) * s for n, s in zip(SHAPE, SPACING[::-1])], indexing="ij")
     values = 125 + 125 * np.sin(0.15 * x + np.sin(0.12 * y)) * np.cos(0.11 * z + 0.05 * x) * np.cos(0.09 * y)
-    image = vtkImageData()
-    image.SetDimensions(*[n + 1 for n in SHAPE[::-1]])
-    image.SetSpacing(*SPACING)
-    image.SetOrigin(*ORIGIN)
-    array = numpy_to_vtk(values.astype(np.float32).ravel(), deep=True)
-    array.SetName("field")
-    image.GetCellData().SetScalars(array)
-    producer = simple.TrivialProducer()
-    producer.GetClientSideObject().SetOutput(image)
-    producer.UpdatePipeline()
-    return producer, np.array(image.GetBounds())
+    return source_of_values(values.astype(np.float32), "field", SPACING, ORIGIN, as_cells=True)
 
 
 def drawn_box(view):
@@ -38,8 +21,7 @@ def drawn_box(view):
     return np.array(volumes.GetNextProp().GetMapper().GetCroppingRegionPlanes())
 
 
-source, bounds = waves_source()
-center = bounds.reshape(3, 2).mean(axis=1)
+source, center = waves_source()
 set_colors("field", 20, 250, peak=0.6)
 view = make_view([240, 240], list(center + [70, 60, 130]), list(center))
 SCALE, SHIFT = [0.6, 0.5, 0.7], [10.3, 20.1, 15.7]
@@ -90,28 +72,19 @@ check(ssim(viewed, ours) >= 0.97,
 write_png("cropping_viewed.png", np.hstack([viewed, ours]))
 
 # Modes that the filter can't show.
-said = []
-
-
-def note(caller, event, message):
-    said.append(message)
-
-
-note.CallDataType = "string0"
-vtkOutputWindow.GetInstance().AddObserver("WarningEvent", note)
 simple.SetActiveView(view)
 for mode in ("Slice", "Composite"):
     representation.BlendMode = mode
-    said.clear()
-    picture(vdi_filter(source, view, "CELLS", "field", 2.0))
+    with Messages("WarningEvent") as said:
+        picture(vdi_filter(source, view, "CELLS", "field", 2.0))
     about = [message for message in said if "Blend Mode" in message]
     check(len(about) == (0 if mode == "Composite" else 1), "%s: %d messages that it can't be had" % (mode, len(about)))
 for name, usual, value, words in (("UseSeparateOpacityArray", 0, 1, "Separate Opacity Array"),
                                   ("UseTransfer2D", 0, 1, "2D Transfer Function"),
                                   ("Scale", [1, 1, 1], [1, 1, 2], "Transforming")):
     setattr(representation, name, value)
-    said.clear()
-    vdi_filter(source, view, "CELLS", "field", 2.0, Resolution=[16, 12]).UpdatePipeline()
+    with Messages("WarningEvent") as said:
+        vdi_filter(source, view, "CELLS", "field", 2.0, Resolution=[16, 12]).UpdatePipeline()
     check(len(said) == 1 and words in said[0], "%s: a message that it can't be had: %s" % (name, " | ".join(said)))
     setattr(representation, name, usual)
 finish()

@@ -2,35 +2,13 @@
 
 import os
 import re
-import sys
 
 import numpy as np
-
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
-from paraview import servermanager  # noqa: E402
-from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
-from vtkmodules.vtkRenderingCore import vtkRenderer  # noqa: E402
+from paraview import servermanager
+from pvtest import *  # noqa: F403
+from vtkmodules.vtkRenderingCore import vtkRenderer
 
 SIZE = [64, 48]
-
-
-class Messages:
-    """The texts of VTK's errors or warnings while it's entered."""
-
-    def __init__(self, event):
-        self.event, self.texts = event, []
-
-    def __enter__(self):
-        def note(caller, event, text):
-            self.texts.append(text)
-
-        note.CallDataType = "string0"
-        self.observer = vtkOutputWindow.GetInstance().AddObserver(self.event, note)
-        return self.texts
-
-    def __exit__(self, *error):
-        vtkOutputWindow.GetInstance().RemoveObserver(self.observer)
 
 
 def field(center, scale=1.0):
@@ -52,12 +30,6 @@ def field(center, scale=1.0):
     add(image.GetPointData(), "velocity", np.stack([ball.ravel() - 1, np.full(n ** 3, 50.0), 0 * ball.ravel()], axis=1))
     add(image.GetCellData(), "layers", np.repeat(np.arange(16.0), 256))
     return image
-
-
-def producer_of(image):
-    producer = simple.TrivialProducer()
-    producer.GetClientSideObject().SetOutput(image)
-    return producer
 
 
 def filter_of(source, association="POINTS", name="ball", **properties):

@@ -8,10 +8,8 @@ import subprocess
 import sys
 
 import numpy as np
-
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
-import server  # noqa: E402
+import server
+from pvtest import *  # noqa: F403
 
 mode = sys.argv[1]
 

@@ -2,14 +2,10 @@
 
 import json
 import os
-import sys
 
 import numpy as np
-
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
-from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
-from vtkmodules.vtkRenderingCore import vtkCamera  # noqa: E402
+from pvtest import *  # noqa: F403
+from vtkmodules.vtkRenderingCore import vtkCamera
 
 POSITION, FOCAL_POINT = [60, 45, 75], [0, 0, 0]
 
@@ -30,14 +26,11 @@ def vdi_of(source, array=("POINTS", "RTData"), **properties):
 
 def errors_of(action):
     """The errors that VTK reports while `action` runs."""
-    texts = []
-    window = vtkOutputWindow.GetInstance()
-    window_messages = window.AddObserver("ErrorEvent", lambda *args: texts.append("error"))
-    try:
-        action()
-    except RuntimeError as error:
-        texts.append(str(error))
-    window.RemoveObserver(window_messages)
+    with Messages("ErrorEvent") as texts:
+        try:
+            action()
+        except RuntimeError as error:
+            texts.append(str(error))
     return texts
 
 
@@ -262,8 +255,7 @@ values = 40 + 230 * np.random.RandomState(5).rand(64 ** 3)  # the wavelet's rang
 in_place = numpy_to_vtk(values)  # shares the memory, as a simulation's arrays do
 in_place.SetName("RTData")
 grid.GetPointData().SetScalars(in_place)
-producer = simple.TrivialProducer()
-producer.GetClientSideObject().SetOutput(grid)
+producer = producer_of(grid)
 watched = vdi_of(producer, CameraFocalPoint=[12, 12, 12])
 check(upload_seconds(watched) > 0, "new values take an upload")
 check(changed_by(watched, lambda: setattr(watched, "CameraPosition", [50, 60, 75])) > 8, "another camera: another picture")

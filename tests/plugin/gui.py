@@ -11,14 +11,6 @@ sys.path.insert(0, os.environ["VDI_TEST_SOURCE"])
 OUTPUT = os.environ["VDI_TEST_OUTPUT"]
 
 
-def screenshot(view, name):
-    import pvtest
-    from paraview import simple
-    path = os.path.join(OUTPUT, name)
-    simple.SaveScreenshot(path, view, ImageResolution=[480, 320])
-    return pvtest.read_png(path)
-
-
 def show_slice(source, view):
     """Shows the source's flat picture in its own colours."""
     from paraview import simple
@@ -52,9 +44,9 @@ def use():
     for proxy, what in ((image, "the filter's picture"), (rendered, "the VDI from 15 degrees")):
         shown = pvtest.picture(proxy)
         pvtest.check(shown is not None and shown.max() > 60 and shown.max(axis=2).std() > 10, what + " shows something")
-    shown = screenshot(view, "gui_view.png")
+    shown = pvtest.screenshot(view, "gui_view.png", [480, 320])
     simple.Hide(image, view)
-    share = pvtest.wrong_share(shown, screenshot(view, "gui_empty.png"), shown)
+    share = pvtest.wrong_share(shown, pvtest.screenshot(view, "gui_empty.png", [480, 320]), shown)
     print("the picture takes {:.2%} of the view".format(share))
     pvtest.check(share > 0.01, "Show puts the picture into the view")
     simple.Show(image, view)

@@ -7,9 +7,7 @@ import os
 import sys
 
 import numpy as np
-
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
+from pvtest import *  # noqa: F403
 
 VARIANTS = {  # name: (layout, kind, cell data, parallel scale)
     "random": ("random", "float32", False, None),

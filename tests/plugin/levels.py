@@ -1,28 +1,12 @@
 """Levels, blanked cells and points as ParaView hands them over, and arrays that are too short."""
 
-import os
-import sys
-
 import numpy as np
-
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
-from vtkmodules.util.misc import calldata_type  # noqa: E402
-from vtkmodules.util.vtkConstants import VTK_STRING  # noqa: E402
-from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
-from vtkmodules.vtkCommonDataModel import (  # noqa: E402
+from pvtest import *  # noqa: F403
+from vtkmodules.vtkCommonDataModel import (
     VTK_XYZ_GRID, vtkAMRBox, vtkDataSetAttributes, vtkMultiBlockDataSet, vtkOverlappingAMR, vtkUniformGrid)
 
 HIDDEN_POINT, HIDDEN_CELL, REFINED_CELL = (
     vtkDataSetAttributes.HIDDENPOINT, vtkDataSetAttributes.HIDDENCELL, vtkDataSetAttributes.REFINEDCELL)
-kept = []  # what producers show lives as long as the test
-
-
-def producer_of(data):
-    producer = simple.TrivialProducer()
-    producer.GetClientSideObject().SetOutput(data)
-    kept.append(data)
-    return producer
 
 
 def filter_of(data, association):
@@ -141,16 +125,8 @@ check(left.max() > 8 and worst <= 2, "hidden points aren't seen, off by %d" % wo
 
 
 def errors_of(action):
-    texts = []
-
-    @calldata_type(VTK_STRING)
-    def note(window, event, text):
-        texts.append(text)
-
-    window = vtkOutputWindow.GetInstance()
-    observer = window.AddObserver("ErrorEvent", note)
-    action()
-    window.RemoveObserver(observer)
+    with Messages("ErrorEvent") as texts:
+        action()
     return " ".join(texts)
 
 

@@ -2,7 +2,6 @@
 If the new device is lost, too, a message appears until there is something new to show."""
 
 import os
-import subprocess
 
 import pvtest
 from paraview import simple
@@ -12,17 +11,13 @@ SIZE, CENTER = [320, 240], [0.5, 0.5, 0.5]
 LOSE = os.environ["VDI_TEST_LOSE_DEVICE"]
 
 
-def make(name, *options):
-    path = os.path.join(pvtest.OUTPUT, name)
-    subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "--size", "24x24x24",
-                    "--resolution", "200x150", "-o", path] + list(options), check=True, stdout=subprocess.DEVNULL)
-    return path
+def make(seed):
+    return pvtest.make_vdi("lost_{}.vdi".format(seed), "--field", "turbulence", "--size", "24x24x24", "--resolution", "200x150",
+                           "--seed", str(seed))
 
 
 def look(view):
-    path = os.path.join(pvtest.OUTPUT, "lost_device.png")
-    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
-    return pvtest.read_png(path)
+    return pvtest.screenshot(view, "lost_device.png", SIZE)
 
 
 def orbit(view, frames=5):
@@ -33,7 +28,7 @@ def orbit(view, frames=5):
 
 if os.path.isdir(LOSE):
     os.rmdir(LOSE)
-reader = simple.OpenDataFile([make("lost_{}.vdi".format(seed), "--seed", str(seed)) for seed in (1, 2)])
+reader = simple.OpenDataFile([make(seed) for seed in (1, 2)])
 view = pvtest.make_view(SIZE, [2.2, 1.9, 2.4], CENTER)
 simple.Show(reader, view)
 simple.Render(view)

@@ -3,12 +3,9 @@ and the VDI is made in the same update. Where every device is lost the filter fa
 works again."""
 
 import os
-import sys
 
 import numpy as np
-
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
+from pvtest import *  # noqa: F403
 
 LOSE = os.environ["VDI_TEST_LOSE_DEVICE"]
 if os.path.isdir(LOSE):

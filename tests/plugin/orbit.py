@@ -3,7 +3,6 @@ are this machine's; on one that does other things as well they're lower. Argumen
 memory)."""
 
 import os
-import subprocess
 import sys
 import time
 
@@ -15,10 +14,7 @@ SIZE, CENTER = [1280, 720], [0.5, 0.5, 0.5]
 
 
 def make(name, *options, field="turbulence"):
-    path = os.path.join(pvtest.OUTPUT, name)
-    subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", field, "-o", path] + list(options), check=True,
-                   stdout=subprocess.DEVNULL)
-    return path
+    return pvtest.make_vdi(name, "--field", field, *options)
 
 
 def megabytes():
@@ -77,9 +73,7 @@ def recognisable():
     interactive_seconds(view, 6, 0.1)  # it takes as few pixels as it may
     seconds = interactive_seconds(view, 6, 0.1)
     rough = pvtest.pixels(view.GetRenderWindow())
-    path = os.path.join(pvtest.OUTPUT, "orbit_coil.png")
-    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
-    whole = pvtest.read_png(path)
+    whole = pvtest.screenshot(view, "orbit_coil.png", SIZE)
     pvtest.write_png("orbit_coil_rough.png", rough)
     likeness = pvtest.ssim(rough, whole)
     print("zoomed in, from the side: {:.1f} frames/s, SSIM to the picture at rest {:.3f}".format(

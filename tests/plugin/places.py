@@ -1,8 +1,6 @@
 """Where views show what isn't the VDI itself: Outline is the volume's box, Slice the flat picture in the middle of it.
 Reset Camera looks at either. No other representation is offered."""
 
-import os
-
 import numpy as np
 import pvtest
 from paraview import simple
@@ -40,9 +38,7 @@ image.GetPointData().SetScalars(array)
 
 
 def screenshot(view, name):
-    path = os.path.join(pvtest.OUTPUT, "places_{}.png".format(name))
-    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
-    return pvtest.read_png(path)
+    return pvtest.screenshot(view, "places_{}.png".format(name), SIZE)
 
 
 def look(view, camera):

@@ -6,20 +6,23 @@ rank 0 runs the test script; sources run on all ranks, inside Programmable Sourc
 import base64
 import os
 import re
+import subprocess
 import sys
+import tempfile
 import zlib
 
 import numpy as np
 from paraview import simple
 from skimage.metrics import structural_similarity
 from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
+from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkUnsignedCharArray
 from vtkmodules.vtkCommonDataModel import vtkImageData
-from vtkmodules.vtkIOImage import vtkPNGReader, vtkPNGWriter
+from vtkmodules.vtkIOImage import vtkNIFTIImageReader, vtkPNGReader, vtkPNGWriter
 
 simple.LoadPlugin(os.environ["VDI_PLUGIN"], remote=False, ns=simple.__dict__)
 
 OUTPUT = os.environ.get("VDI_TEST_OUTPUT", ".")
+BRAINS = "/usr/share/mricron/templates/"
 
 # Runs on every rank. A layered field on the unit cube in BLOCKS^3 blocks, dealt out by LAYOUT ("random", "slabs",
 # "interleaved"), as point data with shared points or cell data, of a numpy type; `self` is the Programmable Source.
@@ -91,6 +94,55 @@ def blocks_source(layout, count=4, cells=8, kind="float32", as_cells=False):
     return source
 
 
+def image_of(values, name, spacing=(1, 1, 1), origin=(0, 0, 0), as_cells=False):
+    """A lattice with an array of the values [z][y][x], of its points or its cells."""
+    image = vtkImageData()
+    image.SetDimensions(*[n + int(as_cells) for n in values.shape[::-1]])
+    image.SetSpacing(*spacing)
+    image.SetOrigin(*origin)
+    array = numpy_to_vtk(np.ascontiguousarray(values).ravel(), deep=True)
+    array.SetName(name)
+    (image.GetCellData() if as_cells else image.GetPointData()).SetScalars(array)
+    return image
+
+
+def producer_of(data):
+    producer = simple.TrivialProducer()
+    producer.GetClientSideObject().SetOutput(data)
+    return producer
+
+
+def source_of_values(values, name, *place, **more):
+    """An updated source of a lattice (image_of), and the place of the lattice's middle."""
+    image = image_of(values, name, *place, **more)
+    source = producer_of(image)
+    source.UpdatePipeline()
+    return source, np.array(image.GetCenter())
+
+
+def brain_of(name, every=1):
+    """Values [z][y][x] of a brain of the package mricron-data, the largest of which is 250, and their spacing. Keeps each
+    `every`th voxel along an axis."""
+    path = os.path.join(BRAINS, name + ".nii.gz")
+    if not os.path.exists(path):
+        print("FAILED  no brain: install the package mricron-data", flush=True)
+        os._exit(1)
+    reader = vtkNIFTIImageReader()
+    reader.SetFileName(path)
+    reader.Update()
+    image = reader.GetOutput()
+    values = vtk_to_numpy(image.GetPointData().GetScalars()).reshape(image.GetDimensions()[::-1]).astype(float)
+    values = values[::every, ::every, ::every]
+    return values * 250 / values.max(), [every * s for s in image.GetSpacing()]
+
+
+def make_vdi(name, *options):
+    """The path of a .vdi file in OUTPUT, which `vdi generate` makes."""
+    path = os.path.join(OUTPUT, name)
+    subprocess.run([os.environ["VDI_TOOL"], "generate", "-o", path, *options], check=True, stdout=subprocess.DEVNULL)
+    return path
+
+
 def set_colors(name, low, high, peak=0.8):
     """A three-hue colour map with a ramp of opacity, for both ParaView's volume rendering and ours."""
     def at(share):
@@ -134,15 +186,11 @@ def paraview_volume(source, view, association, name, unit_distance, keep_range=F
     for key, value in properties.items():
         setattr(representation, key, value)
     simple.HideScalarBarIfNotNeeded(simple.GetColorTransferFunction(name), view)
-    path = os.path.join(OUTPUT, "paraview_volume_{}.png".format(os.getpid()))  # tests run side by side
     view.ViewSize = [64, 36]
     simple.Render(view)  # the first picture of a view moves its camera; a small one is quick
     view.ViewSize = size
     view.CameraPosition, view.CameraFocalPoint, view.CameraParallelScale = camera
-    simple.SaveScreenshot(path, view, ImageResolution=size)
-    seen = read_png(path)
-    os.remove(path)
-    return seen
+    return screenshot(view, None, size)
 
 
 def vdi_filter(source, view, association, name, unit_distance, **properties):
@@ -214,6 +262,16 @@ def pixels(window, front=1):
     return vtk_to_numpy(data).reshape(height, width, -1)[::-1, :, :3].copy()
 
 
+def screenshot(view, name, size):
+    """A picture of the view, [rows][columns][3] bytes from the top. Its file stays in OUTPUT if it has a name."""
+    path = os.path.join(OUTPUT, name or "screenshot_{}.png".format(os.getpid()))  # tests run side by side
+    simple.SaveScreenshot(path, view, ImageResolution=size)
+    seen = read_png(path)
+    if name is None:
+        os.remove(path)
+    return seen
+
+
 def read_png(path):
     reader = vtkPNGReader()
     reader.SetFileName(path)
@@ -244,6 +302,39 @@ def wrong_share(a, b, object_only=None):
     off = np.abs(a.astype(int) - b.astype(int)).max(axis=2) > 16
     inside = (object_only if object_only is not None else b).max(axis=2) > 8
     return off[inside].mean()
+
+
+class Messages:
+    """The texts of VTK's events, errors or warnings, while it's entered."""
+
+    def __init__(self, *events):
+        self.events, self.texts = events, []
+
+    def __enter__(self):
+        def note(caller, event, text):
+            self.texts.append(text)
+
+        note.CallDataType = "string0"
+        self.observers = [vtkOutputWindow.GetInstance().AddObserver(event, note) for event in self.events]
+        return self.texts
+
+    def __exit__(self, *error):
+        for observer in self.observers:
+            vtkOutputWindow.GetInstance().RemoveObserver(observer)
+
+
+def standard_error(action):
+    """The text that `action` writes to the standard error."""
+    with tempfile.TemporaryFile("w+") as file:
+        own = os.dup(2)
+        os.dup2(file.fileno(), 2)
+        try:
+            action()
+        finally:
+            os.dup2(own, 2)
+            os.close(own)
+        file.seek(0)
+        return file.read()
 
 
 failures = []

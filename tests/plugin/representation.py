@@ -8,9 +8,6 @@ import numpy as np
 import pvtest
 from paraview import simple
 from pvtest import check
-from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
-from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkRenderingCore import VTK_STEREO_RIGHT
 
 SIZE, CAMERA, CENTER = [320, 240], [80, 56, 92], [0, 0, 0]
@@ -18,12 +15,10 @@ VDI = os.path.join(pvtest.OUTPUT, "representation.vdi")
 
 
 def screenshot(view, name, camera=None):
-    path = os.path.join(pvtest.OUTPUT, "representation_{}.png".format(name))
     simple.Render(view)  # the first picture of a view moves its camera
     if camera is not None:
         view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = camera, CENTER, [0, 1, 0]
-    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
-    return pvtest.read_png(path)
+    return pvtest.screenshot(view, "representation_{}.png".format(name), SIZE)
 
 
 def rendered(view, name):
@@ -100,9 +95,7 @@ def elsewhere():
     compare(screenshot(view, "parallel", [-60, 30, 110]), rendered(view, "parallel"), 0.995, "in parallel projection")
     view.CameraParallelProjection = 0
     # A larger picture than the window is made of tiles, each with a part of the image plane.
-    path = os.path.join(pvtest.OUTPUT, "representation_large.png")
-    simple.SaveScreenshot(path, view, ImageResolution=[2 * SIZE[0], 2 * SIZE[1]])
-    large = pvtest.read_png(path).astype(float)
+    large = pvtest.screenshot(view, "representation_large.png", [2 * SIZE[0], 2 * SIZE[1]]).astype(float)
     small = large.reshape(SIZE[1], 2, SIZE[0], 2, 3).mean(axis=(1, 3)).astype(np.uint8)
     compare(small, screenshot(view, "small"), 0.98, "a picture larger than the window")
     # A translucent object is drawn by peeling. Beside the VDI, it changes nothing of it.
@@ -126,18 +119,9 @@ def elsewhere():
 
 def ball(centre, radius):
     """A volume that is opaque only inside a ball."""
-    image = vtkImageData()
-    image.SetDimensions(64, 64, 64)
-    image.SetOrigin(-31, -31, -31)
     z, y, x = np.meshgrid(*[np.arange(64.0) - 31] * 3, indexing="ij")
     distance = np.sqrt((x - centre[0]) ** 2 + (y - centre[1]) ** 2 + (z - centre[2]) ** 2)
-    array = numpy_to_vtk(np.clip(radius - distance, -0.5, 0.5).ravel(), deep=True)
-    array.SetName("inside")
-    image.GetPointData().SetScalars(array)
-    source = simple.TrivialProducer()
-    source.GetClientSideObject().SetOutput(image)
-    source.UpdatePipeline()
-    return source
+    return pvtest.source_of_values(np.clip(radius - distance, -0.5, 0.5), "inside", origin=[-31, -31, -31])[0]
 
 
 def column_of(picture):
@@ -153,11 +137,9 @@ def window_column(view, source):
     view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = CAMERA, CENTER, [0, 1, 0]
     for _ in range(2):  # the window is late to know which eye it is
         simple.Render(view)
-    window, data = view.GetRenderWindow(), vtkUnsignedCharArray()
-    width, height = window.GetSize()
-    window.GetPixelData(0, 0, width - 1, height - 1, 0, data, 0)
+    seen = pvtest.pixels(view.GetRenderWindow(), front=0)
     simple.Hide(source, view)
-    return column_of(vtk_to_numpy(data).reshape(height, width, -1)[:, :, :3])
+    return column_of(seen)
 
 
 def stereo():

@@ -4,12 +4,11 @@ in the view, and the next good frame is shown."""
 
 import os
 import shutil
-import subprocess
 
 import pvtest
 from paraview import simple
 from pvtest import check
-from vtkmodules.vtkCommonCore import vtkCollection, vtkOutputWindow
+from vtkmodules.vtkCommonCore import vtkCollection
 
 SIZE = [320, 240]
 FOLDER = os.path.join(pvtest.OUTPUT, "faults")
@@ -18,16 +17,11 @@ os.makedirs(FOLDER)
 
 
 def make(name, *options):
-    path = os.path.join(FOLDER, name)
-    subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "--size", "24x24x24",
-                    "-o", path] + list(options), check=True, stdout=subprocess.DEVNULL)
-    return path
+    return pvtest.make_vdi(os.path.join(FOLDER, name), "--field", "turbulence", "--size", "24x24x24", *options)
 
 
 def look(view, name):
-    path = os.path.join(pvtest.OUTPUT, "faults_{}.png".format(name))
-    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
-    return pvtest.read_png(path)
+    return pvtest.screenshot(view, "faults_{}.png".format(name), SIZE)
 
 
 steps = [make("step_0.vdi", "--resolution", "200x150"), make("step_1.vdi", "--resolution", "120x160", "--azimuth", "80"),
@@ -194,9 +188,7 @@ for _ in range(3):
     simple.Delete(other)
 simple.Show(reader, view)
 check(look(view, "again").std() > 5, "the first view still shows the VDI after the others are closed")
-errors = []
-observer = vtkOutputWindow.GetInstance().AddObserver("ErrorEvent", lambda *_: errors.append(1))
-check(OUT in said_from([2.2, 1.9, 2.4], AWAY) and not errors,
-      "a message after other views have closed is drawn without an error")
-vtkOutputWindow.GetInstance().RemoveObserver(observer)
+with pvtest.Messages("ErrorEvent") as errors:
+    said = said_from([2.2, 1.9, 2.4], AWAY)
+check(OUT in said and not errors, "a message after other views have closed is drawn without an error")
 pvtest.finish()

@@ -1,27 +1,15 @@
 """A client on each rank (pvbatch --symmetric), as in Catalyst. An update that fails must fail on all ranks each time,
 and properties that differ among ranks are an error. Otherwise the test would hang and reach its time limit."""
 
-import os
-import sys
-
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
-from vtkmodules.vtkCommonCore import vtkOutputWindow  # noqa: E402
-from paraview.modules.vtkRemotingCore import vtkProcessModule  # noqa: E402
+from paraview.modules.vtkRemotingCore import vtkProcessModule
+from pvtest import *  # noqa: F403
 
 rank = vtkProcessModule.GetProcessModule().GetPartitionId()
 
 
 def errors_of(proxy):
-    texts = []
-
-    def note(caller, event, text):
-        texts.append(text)
-
-    note.CallDataType = "string0"
-    observer = vtkOutputWindow.GetInstance().AddObserver("ErrorEvent", note)
-    proxy.UpdatePipeline(0.0)
-    vtkOutputWindow.GetInstance().RemoveObserver(observer)
+    with Messages("ErrorEvent") as texts:
+        proxy.UpdatePipeline(0.0)
     return "\n".join(texts)
 
 

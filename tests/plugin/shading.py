@@ -1,42 +1,8 @@
 """Shaded volumes: our volume rendering and our VDI, seen from its viewpoint, against ParaView's own pictures. And the display
 properties and lights that the first update takes."""
 
-import os
-import sys
-
 import numpy as np
-
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
-from vtkmodules.vtkCommonDataModel import vtkImageData  # noqa: E402
-from vtkmodules.vtkIOImage import vtkNIFTIImageReader  # noqa: E402
-
-BRAINS = "/usr/share/mricron/templates/"
-
-
-def producer_of(values, spacing, as_cells=False):
-    """A source of values [z][y][x] and the place of its middle."""
-    image = vtkImageData()
-    image.SetDimensions(*[n + (1 if as_cells else 0) for n in values.shape[::-1]])
-    image.SetSpacing(*spacing)
-    array = numpy_to_vtk(np.ascontiguousarray(values).ravel(), deep=True)
-    array.SetName("field")
-    (image.GetCellData() if as_cells else image.GetPointData()).SetScalars(array)
-    producer = simple.TrivialProducer()
-    producer.GetClientSideObject().SetOutput(image)
-    producer.UpdatePipeline()
-    return producer, np.array(image.GetBounds()).reshape(3, 2).mean(axis=1)
-
-
-def brain_of(name, coarser):
-    """Values [z][y][x], their largest is 250, and their spacing."""
-    reader = vtkNIFTIImageReader()
-    reader.SetFileName(BRAINS + name)
-    reader.Update()
-    image = reader.GetOutput()
-    values = vtk_to_numpy(image.GetPointData().GetScalars()).reshape(image.GetDimensions()[::-1]).astype(float)
-    values = values[::coarser, ::coarser, ::coarser]
-    return values * 250 / values.max(), [coarser * s for s in image.GetSpacing()]
+from pvtest import *  # noqa: F403
 
 
 def wavelet():
@@ -52,20 +18,17 @@ def waves(shape, spacing):
     return 125 + 125 * np.sin(0.11 * x + np.sin(0.07 * y)) * np.cos(0.08 * z + 0.05 * x) * np.cos(0.06 * y)
 
 
-if not os.path.exists(BRAINS):
-    print("FAILED  no brain: install the package mricron-data")
-    os._exit(1)
 FLAT = [1.0, 0.7, 3.0]
 # Values, spacing, type, of cells, parallel scale, representation's properties.
 CASES = {
-    "brain_u8": (*brain_of("ch2better.nii.gz", 2), np.uint8, False, None, {}),
-    "brain_f32": (*brain_of("inia19-t1-brain.nii.gz", 2), np.float32, False, None, {"Diffuse": 0.7}),
+    "brain_u8": (*brain_of("ch2better", 2), np.uint8, False, None, {}),
+    "brain_f32": (*brain_of("inia19-t1-brain", 2), np.float32, False, None, {"Diffuse": 0.7}),
     "wavelet_f32": (wavelet(), [1.0] * 3, np.float32, False, 22.0, {}),
     "flat_f32": (waves((30, 120, 90), FLAT), FLAT, np.float32, False, None, {}),
     "flat_u16_cells": (waves((30, 120, 90), FLAT), FLAT, np.uint16, True, None, {}),
 }
 for name, (values, spacing, kind, as_cells, parallel_scale, properties) in CASES.items():
-    source, center = producer_of(values.astype(kind), spacing, as_cells)
+    source, center = source_of_values(values.astype(kind), "field", spacing, as_cells=as_cells)
     association = "CELLS" if as_cells else "POINTS"
     set_colors("field", 20, 250, peak=0.6)
     extent = max(n * s for n, s in zip(values.shape[::-1], spacing))
@@ -96,7 +59,7 @@ for name, (values, spacing, kind, as_cells, parallel_scale, properties) in CASES
     simple.Delete(view)
 
 # Another view's lights: one headlight, which lets ambient light show too; two lights of colours; none.
-source, center = producer_of(waves((40, 40, 40), [3.0] * 3).astype(np.float32), [3.0] * 3)
+source, center = source_of_values(waves((40, 40, 40), [3.0] * 3).astype(np.float32), "field", [3.0] * 3)
 for name in ("headlight", "two_lights", "no_light"):
     view = make_view([200, 200], list(center + [160, 120, 250]), list(center))
     view.UseLight = 0

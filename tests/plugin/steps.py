@@ -4,7 +4,6 @@ other things run as well they're higher."""
 
 import os
 import shutil
-import subprocess
 import time
 
 import numpy as np
@@ -19,10 +18,8 @@ KINDS, COUNT = 4, 20
 
 
 def make(kind, resolution="320x180", azimuth="0"):
-    path = os.path.join(FOLDER, "kind_{}.vdi".format(kind))
-    subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "--seed", str(kind + 1), "--size", "32x32x32",
-                    "--resolution", resolution, "--azimuth", azimuth, "-o", path], check=True, stdout=subprocess.DEVNULL)
-    return path
+    return pvtest.make_vdi(os.path.join(FOLDER, "kind_{}.vdi".format(kind)), "--field", "turbulence", "--seed", str(kind + 1),
+                           "--size", "32x32x32", "--resolution", resolution, "--azimuth", azimuth)
 
 
 def make_view():
@@ -37,9 +34,7 @@ def place(view):
 
 def screenshot(view, name):
     place(view)
-    path = os.path.join(FOLDER, name + ".png")
-    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
-    return pvtest.read_png(path)
+    return pvtest.screenshot(view, os.path.join(FOLDER, name + ".png"), SIZE)
 
 
 def interactive_picture(view):
@@ -78,20 +73,6 @@ def read_ahead(step):
     for before in range(step - 3, step):
         view.ViewTime = times[before]
         view.SMProxy.Update()
-
-
-def said_by(action):
-    """The text that `action` writes to stderr."""
-    path, own = os.path.join(FOLDER, "said"), os.dup(2)
-    with open(path, "w") as file:
-        os.dup2(file.fileno(), 2)
-    try:
-        action()
-    finally:
-        os.dup2(own, 2)
-        os.close(own)
-    with open(path) as file:
-        return file.read()
 
 
 def ms(seconds):
@@ -181,7 +162,7 @@ check(same(screenshot(view, "replaced"), other_expected),
 read_ahead(15)
 os.truncate(files[15], os.path.getsize(files[15]) // 2)
 view.ViewTime = times[15]
-lines = said_by(lambda: screenshot(view, "truncated"))
+lines = pvtest.standard_error(lambda: screenshot(view, "truncated"))
 check("what makes it has failed" in pvtest.message_in(view),
       "a file that isn't whole any more isn't shown, and the view says so")
 check(lines.count("invalid .vdi file") == 1, "one line says why the file that isn't whole isn't shown")

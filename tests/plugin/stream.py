@@ -7,8 +7,7 @@ import subprocess
 import sys
 import time
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
+from pvtest import *  # noqa: F403
 
 name = sys.argv[1]
 link_file = os.path.join(OUTPUT, "stream_%s.link" % name)

@@ -8,9 +8,10 @@ import subprocess
 import tempfile
 import time
 
+import pvtest
 import server
 from paraview import servermanager, simple, smtrace
-from pvtest import OUTPUT, check, finish, make_view, message_in, read_png
+from pvtest import check, finish, make_view, message_in, standard_error
 from vtkmodules.util.numpy_support import vtk_to_numpy
 
 TOOL, SIZE, PATIENCE = os.environ["VDI_TOOL"], [160, 120], 60
@@ -94,11 +95,7 @@ def screenshot(source):
     simple.HideAll(view)
     simple.Show(source, view).SetRepresentationType("VDI")
     view.CameraPosition, view.CameraFocalPoint = [2.2, 1.4, 2.0], [0.5, 0.5, 0.5]
-    path = os.path.join(OUTPUT, "stream_source_{}.png".format(os.getpid()))
-    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
-    seen = read_png(path)
-    os.remove(path)
-    return seen
+    return pvtest.screenshot(view, None, SIZE)
 
 
 def shows(source, step):
@@ -108,20 +105,6 @@ def shows(source, step):
     seen = screenshot(source)
     simple.Delete(opened)
     return expected.std() > 10 and bool((seen == expected).all())
-
-
-def said(call):
-    """The text that `call` writes to the standard error."""
-    with tempfile.TemporaryFile("w+") as file:
-        kept = os.dup(2)
-        os.dup2(file.fileno(), 2)
-        try:
-            call()
-        finally:
-            os.dup2(kept, 2)
-            os.close(kept)
-        file.seek(0)
-        return file.read()
 
 
 def text_of(path):
@@ -192,7 +175,7 @@ def nothing_yet():
     empty = Folder("empty")
     empty.serve()
     source = simple.VDIStream(URL=empty.link, Patience=0.5)
-    text = said(lambda: screenshot(source))
+    text = standard_error(lambda: screenshot(source))
     check(text == "", "a source that waits is no error: " + text)
     check("There is no VDI to show yet" in message_in(view), "the view says that there is no VDI yet: " + message_in(view))
     empty.appear(1)
@@ -211,7 +194,7 @@ def wrong_token(live):
             screenshot(source)
             take(source)
 
-    text = said(use)
+    text = standard_error(use)
     line = information(source, "Connection")
     check("the token is wrong" in line and "\n" not in line, "a wrong token makes one line: " + line)
     check(text.count("the token is wrong") == 1, "a wrong token is said once: " + text)
@@ -249,7 +232,7 @@ def saved_without_token(live, source):
     simple.ResetSession()
     simple.LoadState(files["pvsm"])
     loaded, = simple.GetSources().values()
-    text = said(loaded.UpdatePipeline)
+    text = standard_error(loaded.UpdatePipeline)
     check("there is no token" in information(loaded, "Connection") and text.count("there is no token") == 1,
           "a loaded state says once that it needs a token: " + text)
     loaded.URL = live.link

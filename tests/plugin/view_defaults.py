@@ -1,13 +1,10 @@
 """VolumetricDepthImage takes settings from the active view, and traces and states make it anew."""
 
 import os
-import sys
 
 import numpy as np
-
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
-from paraview import smtrace  # noqa: E402
+from paraview import smtrace
+from pvtest import *  # noqa: F403
 
 OPACITY = [80, 0, 0.5, 0, 300, 0.1, 0.5, 0, 550, 0.9, 0.5, 0]
 SIZE, POSITION, UP = [160, 120], [40, 30, 50], [0.1, 0.9, 0.2]

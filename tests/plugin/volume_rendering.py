@@ -1,63 +1,17 @@
 """Our volume rendering against ParaView's own on real data: a brain of the package mricron-data, unshaded, with point and
 cell data, 8 and 16 bits and floats, perspective and parallel."""
 
-import glob
-import gzip
-import os
-import struct
-import sys
-
 import numpy as np
+from pvtest import *  # noqa: F403
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from pvtest import *  # noqa: E402,F403
-from vtkmodules.vtkCommonDataModel import vtkImageData  # noqa: E402
-
-
-def read_nifti(path):
-    """Values [z][y][x] and spacing of a NIfTI-1 file."""
-    data = gzip.open(path).read()
-    dims = struct.unpack("<8h", data[40:56])[1:4]
-    code = struct.unpack("<h", data[70:72])[0]
-    spacing = struct.unpack("<8f", data[76:108])[1:4]
-    offset = int(struct.unpack("<f", data[108:112])[0])
-    kind = {2: np.uint8, 4: np.int16, 8: np.int32, 16: np.float32, 512: np.uint16}[code]
-    return np.frombuffer(data, kind, int(np.prod(dims)), offset).reshape(dims[::-1]), spacing
-
-
-def producer_of(values, spacing, as_cells):
-    image = vtkImageData()
-    extra = 1 if as_cells else 0
-    image.SetDimensions(*[n + extra for n in values.shape[::-1]])
-    image.SetSpacing(*spacing)
-    array = numpy_to_vtk(values.ravel(), deep=True)
-    array.SetName("brain")
-    (image.GetCellData() if as_cells else image.GetPointData()).SetScalars(array)
-    producer = simple.TrivialProducer()
-    producer.GetClientSideObject().SetOutput(image)
-    producer.UpdatePipeline()
-    return producer, np.array(image.GetBounds()).reshape(3, 2).mean(axis=1)
-
-
-def read_brain(name):
-    path = glob.glob("/usr/share/mricron/templates/%s.nii.gz" % name)
-    if not path:
-        print("FAILED  no brain: install the package mricron-data")
-        os._exit(1)
-    return read_nifti(path[0])
-
-
-brain, spacing = read_brain("ch2better")
-brain = brain[::2, ::2, ::2].astype(float)
-brain *= 250.0 / brain.max()
-spacing = [2 * s for s in spacing]
+brain, spacing = brain_of("ch2better", 2)
 CASES = {
     "uint8": (np.uint8, 1.0, False, None),
     "uint16_cells": (np.uint16, 200.0, True, None),
     "float_parallel": (np.float32, 0.01, False, 110.0),
 }
 for name, (kind, scale, as_cells, parallel_scale) in CASES.items():
-    source, center = producer_of((brain * scale).astype(kind), spacing, as_cells)
+    source, center = source_of_values((brain * scale).astype(kind), "brain", spacing, as_cells=as_cells)
     association = "CELLS" if as_cells else "POINTS"
     set_colors("brain", 20 * scale, 250 * scale, peak=0.6)
     view = make_view([240, 240], list(center + [210, 170, 330]), list(center), parallel_scale)
@@ -75,7 +29,7 @@ BANDS = [0, 0]
 for middle in (50, 112.5, 175):
     BANDS += [middle - 5, 0, middle - 4.99, 1, middle + 4.99, 1, middle + 5, 0]
 FUNCTIONS = {"rising": ([20, 0, 250, 0.6], 0.99), "opaque_bands": (BANDS + [250, 0], 0.995)}
-source, center = producer_of(brain.astype(np.uint8), spacing, False)
+source, center = source_of_values(brain.astype(np.uint8), "brain", spacing)
 for name, (nodes, least) in FUNCTIONS.items():
     _, opacity = set_colors("brain", 0, 250)
     points = []
@@ -93,10 +47,8 @@ for name, (nodes, least) in FUNCTIONS.items():
     simple.Delete(view)
 
 # A colour map without red, for floats: the picture has no red, either.
-brain, spacing = read_brain("inia19-t1-brain")
-brain = brain.astype(np.float32)
-brain /= brain.max()
-source, center = producer_of(brain, spacing, False)
+brain, spacing = brain_of("inia19-t1-brain")
+source, center = source_of_values((brain / 250).astype(np.float32), "brain", spacing)
 colors, opacity = set_colors("brain", 0, 1)
 colors.RGBPoints = [0, 0, 0, 1, 0.5, 0, 0.2, 1, 1, 0, 1, 0.3]
 opacity.Points = [0, 0, 0.5, 0, 0.1, 0, 0.5, 0, 1, 0.5, 0.5, 0]
@@ -117,9 +69,9 @@ def hue(share):
     return [float(np.clip(abs((share * 6 + shift) % 6 - 3) - 1, 0, 1)) for shift in (0, 4, 2)]
 
 
-def brain_of(name):
-    values, spacing = read_brain(name)
-    source, center = producer_of(values.astype(np.float32), spacing, False)
+def whole_brain(name):
+    values, spacing = brain_of(name)
+    source, center = source_of_values(values.astype(np.float32), "brain", spacing)
     size = np.linalg.norm(np.array(values.shape[::-1]) * spacing)
     return source, center, float(np.percentile(values[values > 0], 99.5)), size
 
@@ -127,11 +79,11 @@ def brain_of(name):
 def sphere():
     z, y, x = np.mgrid[0:64, 0:64, 0:64] - 31.5
     values = 100 * np.clip(20.3 - np.sqrt(x * x + y * y + z * z) + 0.5, 0, 1)
-    source, center = producer_of(values.astype(np.float32), [1.0, 1.0, 1.0], False)
+    source, center = source_of_values(values.astype(np.float32), "brain")
     return source, center, 100.0, 85.0
 
 
-DATA = {"ch2bet": lambda: brain_of("ch2bet"), "inia19": lambda: brain_of("inia19-t1-brain"), "sphere": sphere}
+DATA = {"ch2bet": lambda: whole_brain("ch2bet"), "inia19": lambda: whole_brain("inia19-t1-brain"), "sphere": sphere}
 for data, make in DATA.items():
     source, center, top, size = make()
     for name, count, middle, end in (("8_hues", 8, 0.15, 0.6), ("16_hues", 16, 0.15, 0.6), ("dense", 8, 0.8, 0.9)):
