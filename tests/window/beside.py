@@ -3,45 +3,19 @@ Prints the longest time that the window took to answer meanwhile, and checks tha
 view while an animation is played or saved.
 beside_scene.py runs inside ParaView. Needs VDI_PLUGIN and VDI_TEST_OUTPUT."""
 
-import json
 import os
-import shutil
 import sys
 import time
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, HERE)
-from window import Pulse, Screen, Window, check, failures, ssim, wait_for  # noqa: E402
+from window import Inside, Pulse, Screen, Window, check, failures, ssim, wait_for  # noqa: E402
 
-OUTPUT = os.environ["VDI_TEST_OUTPUT"] = os.path.join(os.environ["VDI_TEST_OUTPUT"], "beside")
-shutil.rmtree(OUTPUT, ignore_errors=True)
-os.makedirs(OUTPUT)
+inside = Inside("beside")  # calls of beside_scene.py
+path = inside.path
 # The longest that the window may take to answer. These took as long as making the VDI does. At the first Apply ParaView makes
 # what shows it, and the device's programs for its first picture are compiled. A slow machine gets a share of the VDI's time.
 FIRST_ANSWER_SECONDS, ANSWER_SECONDS, ANSWER_SHARE = 2.5, 1.25, 0.3
-
-
-def path(name):
-    return os.path.join(OUTPUT, name)
-
-
-def read(name):
-    if not os.path.exists(path(name)):
-        return None
-    with open(path(name)) as file:
-        return file.read()
-
-
-def inside(call):
-    """The result of a call of beside_scene.py."""
-    if read("done") is not None:
-        os.remove(path("done"))
-    with open(path("do.new"), "w") as file:
-        file.write(call)
-    os.replace(path("do.new"), path("do"))
-    result = json.loads(wait_for("end of " + call, lambda: read("done"), 60))
-    assert not str(result).startswith("Traceback"), result
-    return result
 
 
 def made(array, step):
@@ -140,9 +114,9 @@ def delete_while_made(window):
     check(pulse.longest <= ANSWER_SECONDS, "Delete doesn't freeze the window while a step is made")
 
 
-with Screen(1300, 860) as screen, Window(screen, "--script=" + os.path.join(HERE, "beside_scene.py"), output=OUTPUT) as window:
-    said = wait_for("end of the script", lambda: read("ready"), 100)
-    assert said == "ok", said
+SCRIPT = "--script=" + os.path.join(HERE, "beside_scene.py")
+with Screen(1300, 860) as screen, Window(screen, SCRIPT, output=inside.folder) as window:
+    inside.wait_for_script()
     window.wait_for_picture()
     first_apply(window)
     others_wait(window)

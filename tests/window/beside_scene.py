@@ -1,13 +1,15 @@
 """Runs inside the real ParaView (--script): loads the plugin, shows a volume of two arrays and four time steps, and says
 "ready". From then on it answers what beside.py asks of it. The data are made once: what is measured is the VDI's time."""
 
-import json
 import os
+import sys
 import traceback
 
 from paraview import simple
 
-OUTPUT = os.environ["VDI_TEST_OUTPUT"]
+sys.path.insert(0, os.path.join(os.path.dirname(os.environ["VDI_TEST_SOURCE"]), "window"))
+from inside import OUTPUT, answer, leave  # noqa: E402
+
 SIZE = 96
 
 INFORMATION = """
@@ -43,14 +45,6 @@ for name, values in zip(("small", "temperature"), self.made[int(time)]):
 image.GetPointData().SetActiveScalars("small")
 image.GetInformation().Set(image.DATA_TIME_STEP(), time)
 """ % SIZE
-
-
-def leave(name, text):
-    """Whole or not at all."""
-    path = os.path.join(OUTPUT, name)
-    with open(path + ".new", "w") as file:
-        file.write(text)
-    os.replace(path + ".new", path)
 
 
 def filter_now():
@@ -130,25 +124,9 @@ def show_scene():
     simple.Render(view)
 
 
-def obey(*_):
-    """The file "do" has an expression, "done" gets what comes of it."""
-    path = os.path.join(OUTPUT, "do")
-    if not os.path.exists(path):
-        return
-    with open(path) as file:
-        wanted = file.read()
-    os.remove(path)
-    try:
-        leave("done", json.dumps(eval(wanted, globals())))
-    except Exception:
-        leave("done", json.dumps(traceback.format_exc()))
-
-
 try:
     show_scene()
-    interactor = simple.GetActiveView().GetInteractor()
-    interactor.AddObserver("TimerEvent", obey)
-    interactor.CreateRepeatingTimer(100)
+    answer(simple.GetActiveView().GetInteractor(), globals())
     leave("ready", "ok")
 except Exception:
     leave("ready", traceback.format_exc())

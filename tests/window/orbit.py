@@ -2,60 +2,34 @@
 camera (orbit_compare.py). Then without the mouse (orbit_inside.py): what comes late shows by itself. orbit_notes.py runs inside
 ParaView. Needs VDI_PLUGIN, VDI_TOOL, VDI_LOSE_DEVICE and VDI_TEST_OUTPUT."""
 
-import json
 import os
-import shutil
 import subprocess
 import sys
 import time
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path.insert(0, HERE)
-from window import Screen, Window, wait_for  # noqa: E402
+from window import Inside, Screen, Window, wait_for  # noqa: E402
 
-OUTPUT = os.environ["VDI_TEST_OUTPUT"] = os.path.join(os.environ["VDI_TEST_OUTPUT"], "orbit")
-os.environ["VDI_TEST_SOURCE"] = os.path.join(os.path.dirname(HERE), "plugin")  # which has pvtest.py
-shutil.rmtree(OUTPUT, ignore_errors=True)
-os.makedirs(OUTPUT)
-
-
-def read(name):
-    path = os.path.join(OUTPUT, name)
-    if not os.path.exists(path):
-        return None
-    with open(path) as file:
-        return file.read()
+inside = Inside("orbit")  # calls of orbit_inside.py
 
 
 def compare(window, name, start, end, what="orbited"):
     """Drags from start to end, then compares the window with the tool's picture. orbit_compare.py gets `what`."""
-    if read("camera.json"):
-        os.remove(os.path.join(OUTPUT, "camera.json"))
+    if inside.read("camera.json"):
+        os.remove(inside.path("camera.json"))
     window.drag(start, end, steps=30, seconds=1.5)
-    wait_for("end of the drag", lambda: read("camera.json"), 60)
+    wait_for("end of the drag", lambda: inside.read("camera.json"), 60)
     window.wait_for_picture()  # in full
     picture = window.screenshot(name)
     subprocess.run(["pvpython", os.path.join(HERE, "orbit_compare.py"), picture, what], check=True, timeout=200)
 
 
 def generate(name, *options):
-    path = os.path.join(OUTPUT, name)
+    path = inside.path(name)
     subprocess.run([os.environ["VDI_TOOL"], "generate", "--field", "turbulence", "--size", "32x32x32", "-o", path]
                    + list(options), check=True, stdout=subprocess.DEVNULL)
     return path
-
-
-def inside(call):
-    """The result of a call of orbit_inside.py."""
-    if read("done") is not None:
-        os.remove(os.path.join(OUTPUT, "done"))
-    path = os.path.join(OUTPUT, "do")
-    with open(path + ".new", "w") as file:
-        file.write(call)
-    os.replace(path + ".new", path)
-    result = json.loads(wait_for("end of " + call, lambda: read("done"), 60))
-    assert not str(result).startswith("Traceback"), result
-    return result
 
 
 def steps():
@@ -141,12 +115,12 @@ def two_views():
 
 
 generate("input.vdi", "--resolution", "160x160", "--supersegments", "12", "--azimuth", "40")
-LOSE_STILLS = os.environ["VDI_TEST_LOSE_STILLS"] = os.path.join(OUTPUT, "lose_stills")
+LOSE_STILLS = os.environ["VDI_TEST_LOSE_STILLS"] = inside.path("lose_stills")
 os.environ["LD_PRELOAD"] = os.environ["VDI_LOSE_DEVICE"]
-with Screen(1100, 760) as screen, Window(screen, "--script=" + os.path.join(HERE, "orbit_notes.py"), output=OUTPUT) as window:
-    said = wait_for("end of the script", lambda: read("ready"), 100)
-    assert said == "ok", said
-    window.open_file(os.path.join(OUTPUT, "input.vdi"))
+SCRIPT = "--script=" + os.path.join(HERE, "orbit_notes.py")
+with Screen(1100, 760) as screen, Window(screen, SCRIPT, output=inside.folder) as window:
+    inside.wait_for_script()
+    window.open_file(inside.path("input.vdi"))
     window.click("Apply")
     window.wait_for_picture()
     left, top, width, height = window.view()

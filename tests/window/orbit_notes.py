@@ -8,19 +8,11 @@ import sys
 import traceback
 
 sys.path[:0] = [os.environ["VDI_TEST_SOURCE"], os.path.join(os.path.dirname(os.environ["VDI_TEST_SOURCE"]), "window")]
-OUTPUT = os.environ["VDI_TEST_OUTPUT"]
-
-
-def leave(name, text):
-    """Whole or not at all."""
-    path = os.path.join(OUTPUT, name)
-    with open(path + ".new", "w") as file:
-        file.write(text)
-    os.replace(path + ".new", path)
+from inside import OUTPUT, answer, kept, leave  # noqa: E402
 
 
 def use():
-    import pvtest  # loads the plugin
+    import orbit_inside  # loads the plugin
     from paraview import simple
 
     view = simple.GetActiveViewOrCreate("RenderView")
@@ -45,27 +37,10 @@ def use():
             "representations": [each.Representation.GetData() for each in shown if each and each.Visibility]}))
         frames.clear()
 
-    def obey(*_):
-        """The file "do" has an expression, "done" gets what comes of it."""
-        path = os.path.join(OUTPUT, "do")
-        if not os.path.exists(path):
-            return
-        with open(path) as file:
-            wanted = file.read()
-        os.remove(path)
-        try:
-            import orbit_inside
-            leave("done", json.dumps(eval(wanted, vars(orbit_inside))))
-        except Exception:
-            leave("done", json.dumps(traceback.format_exc()))
-
-    view.GetInteractor().AddObserver("TimerEvent", obey)
-    view.GetInteractor().CreateRepeatingTimer(100)
+    answer(view.GetInteractor(), vars(orbit_inside))
     window.AddObserver("EndEvent", count)
     view.GetInteractor().AddObserver("EndInteractionEvent", note)
-    # Python would take what only VTK's objects know of for garbage, and call what is left of it.
-    pvtest.kept = [view, window, view.GetInteractor(), count, note, obey]
-    return pvtest.failures
+    kept.extend([view, window, count, note])
 
 
 try:

@@ -1,18 +1,17 @@
 """By mouse, as the guide says it: from a shown volume to a VDI in two clicks, its opacity edited, Auto and its undo, saved as
 data and as a state, the trace replayed and the state loaded. Leaves a screenshot of each step in VDI_TEST_OUTPUT."""
 
+import functools
 import os
-import shutil
 import subprocess
 import sys
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from window import COLOR_EDITOR, Pulse, Screen, Window, check, failures, ssim, wait_for  # noqa: E402
+from window import COLOR_EDITOR, Pulse, Screen, Window, check, failures, output_folder, ssim, wait_for  # noqa: E402
 
-OUTPUT = os.path.join(os.environ["VDI_TEST_OUTPUT"], "panel")
-shutil.rmtree(OUTPUT, ignore_errors=True)  # what another run left makes the lists of files longer
-os.makedirs(OUTPUT)
+OUTPUT = output_folder("panel")
+path = functools.partial(os.path.join, OUTPUT)
 # The longest that the window may take to answer while a colour is edited. It took 5 to 20 s before VDIs
 # were made in the background, and 0.5 to 1.3 s before still frames were. Two cores with nothing else to
 # do take 0.2 s now.
@@ -28,20 +27,9 @@ SaveData(os.environ["VDI_REPLAYED"], proxy=FindSource("VolumetricDepthImage1"))
 """
 
 
-def path(name):
-    return os.path.join(OUTPUT, name)
-
-
 def bytes_of(name):
     with open(name, "rb") as file:
         return file.read()
-
-
-def middle_of_view(window, name):
-    """A picture of it, once it rests; without the colour legend, which only the volume has."""
-    window.wait_for_picture()
-    subprocess.run(["import", "-window", "root", "-crop", window.middle, "+repage", path(name)], check=True)
-    return path(name)
 
 
 def check_like_volume(volume, vdi):
@@ -140,7 +128,7 @@ def first_session(window):
     window.drag((x + width // 2, y + height // 2), (x + width // 2 + 120, y + height // 2 - 70))
     time.sleep(1)
     window.screenshot("1_volume.png")
-    volume = middle_of_view(window, "volume_middle.png")
+    volume = window.screenshot_of_middle("volume_middle.png")
 
     window.menu("Filters", "Volumetric Depth Images")
     window.screenshot("2_menu.png")
@@ -153,7 +141,7 @@ def first_session(window):
     window.apply()
     time.sleep(1)
     window.screenshot("4_applied.png")
-    check_like_volume(volume, middle_of_view(window, "vdi_middle.png"))
+    check_like_volume(volume, window.screenshot_of_middle("vdi_middle.png"))
     values = window.values()
     check(estimates(window, "Estimate from the last VDI: ").endswith(" s"), "the estimate from the last VDI has a time")
     check(any(value.startswith("1.73205") for value in values), "the unit distance is the volume's")

@@ -2,38 +2,26 @@
 saved; then ParaView anew, without the server, with the file: orbit again. What the view shows is compared with the tool's
 picture for its camera (seen.py). Leaves a screenshot of each step in VDI_TEST_OUTPUT."""
 
+import functools
 import os
-import shutil
-import subprocess
 import sys
 import time
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import seen  # noqa: E402
-from window import COLOR_EDITOR, Pulse, Screen, Server, Window, check, failures, ssim, wait_for  # noqa: E402
+from window import COLOR_EDITOR, Pulse, Screen, Server, Window, check, failures, output_folder, ssim, wait_for  # noqa: E402
 
-OUTPUT = os.path.join(os.environ["VDI_TEST_OUTPUT"], "server")
-shutil.rmtree(OUTPUT, ignore_errors=True)
-os.makedirs(OUTPUT)
+OUTPUT = output_folder("server")
+path = functools.partial(os.path.join, OUTPUT)
 # An edit kept the window from answering for 10 to 20 s before the server's ranks made VDIs beside their other
 # work.
 ANSWER_SECONDS = 1.0
-
-
-def path(name):
-    return os.path.join(OUTPUT, name)
 
 
 def black_background(window):
     """Sets the black background that the tool's pictures have."""
     window.click("Load a color palette")
     window.key(*["Down"] * 6, "Return")  # Black Background; the menu is not exposed to accessibility tools
-
-
-def middle_of_view(window, name):
-    window.wait_for_picture()
-    subprocess.run(["import", "-window", "root", "-crop", window.middle, "+repage", path(name)], check=True)
-    return path(name)
 
 
 def check_view(window, vdi, name):
@@ -92,15 +80,15 @@ def reopened(screen):
         window.apply(200)
         window.wait_for_picture()
         check_view(window, "first.vdi", "5_opened")
-        opened = middle_of_view(window, "5_middle.png")
+        opened = window.screenshot_of_middle("5_middle.png")
         for said in ("Array: RTData (points)", "Range: ", "Seen from: ("):
             text = window.text_that_begins("Array: ")
             check(text is not None and said in text, "the opened file's panel says " + said)
         window.orbit(80, 30)
         check_view(window, "first.vdi", "6_orbited_again")
-        orbited = middle_of_view(window, "6_middle.png")
+        orbited = window.screenshot_of_middle("6_middle.png")
         window.click("Look as Made")
-        wait_for("another picture", lambda: ssim(orbited, middle_of_view(window, "7_middle.png")) < 0.9, 60)
+        wait_for("another picture", lambda: ssim(orbited, window.screenshot_of_middle("7_middle.png")) < 0.9, 60)
         similar = ssim(opened, path("7_middle.png"))
         print("Look as Made: SSIM %.4f to what was shown at first" % similar, flush=True)
         check(similar > 0.95, "Look as Made shows what was shown at first")

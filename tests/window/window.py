@@ -9,6 +9,7 @@ Widgets are found by the text or tool tip that a screen reader would read (AT-SP
 xdotool, openbox, Xvfb, ImageMagick, dbus, at-spi2-core and python3-gi.
 """
 
+import functools
 import html
 import json
 import os
@@ -22,7 +23,8 @@ import time
 
 from gi.repository import Gio, GLib
 
-sys.path.append(os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "plugin"))
+PLUGIN_TESTS = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), "plugin")
+sys.path.append(PLUGIN_TESTS)
 import server  # noqa: E402
 
 SECONDS = 20.0  # that a widget may take to show up
@@ -54,6 +56,46 @@ def ssim(one, other):
     """The SSIM of two PNG files, which the tool computes."""
     said = subprocess.run([os.environ["VDI_TOOL"], "compare", "--json", one, other], check=True, capture_output=True)
     return json.loads(said.stdout)["ssim"]
+
+
+def output_folder(name):
+    """A folder of VDI_TEST_OUTPUT, which is made anew: what another run left would make the lists of files longer."""
+    path = os.path.join(os.environ["VDI_TEST_OUTPUT"], name)
+    shutil.rmtree(path, ignore_errors=True)
+    os.makedirs(path)
+    return path
+
+
+class Inside:
+    """Calls functions inside ParaView. The script that ParaView runs answers them (inside.py), by files in a folder that
+    becomes VDI_TEST_OUTPUT."""
+
+    def __init__(self, name):
+        self.folder = os.environ["VDI_TEST_OUTPUT"] = output_folder(name)
+        os.environ["VDI_TEST_SOURCE"] = PLUGIN_TESTS  # which has pvtest.py
+        self.path = functools.partial(os.path.join, self.folder)
+
+    def read(self, name):
+        """The text of a file; None if there is none."""
+        if not os.path.exists(self.path(name)):
+            return None
+        with open(self.path(name)) as file:
+            return file.read()
+
+    def wait_for_script(self):
+        said = wait_for("end of the script", lambda: self.read("ready"), 100)
+        assert said == "ok", said
+
+    def __call__(self, call):
+        """The result of a call."""
+        if self.read("done") is not None:
+            os.remove(self.path("done"))
+        with open(self.path("do.new"), "w") as file:
+            file.write(call)
+        os.replace(self.path("do.new"), self.path("do"))
+        result = json.loads(wait_for("end of " + call, lambda: self.read("done"), 60))
+        assert not str(result).startswith("Traceback"), result
+        return result
 
 
 class Session:
@@ -609,6 +651,13 @@ class Window:
     def screenshot(self, name):
         path = os.path.join(self.output, name)
         subprocess.run(["import", "-window", "root", path], check=True)
+        return path
+
+    def screenshot_of_middle(self, name):
+        """A picture of the middle of the view, once it rests; without the colour legend, which only a volume has."""
+        self.wait_for_picture()
+        path = os.path.join(self.output, name)
+        subprocess.run(["import", "-window", "root", "-crop", self.middle, "+repage", path], check=True)
         return path
 
     def _point(self, target, role):
