@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/write.hpp>
@@ -340,6 +341,7 @@ TEST_CASE("damaged messages of viewers harm nobody") {
       const std::string sound = textOf(viewersMessage(noise));
       const std::string text = noise.below(3) == 0 ? sound : changed(sound, noise);
       if (!understood<FromViewer>(text, viewerMessage)) ++refused;
+      (void)understood<FromServer>(text, serverMessage);  // nor does what comes from the wrong side
       viewer.receive(text, now);
       bool isGone = noise.below(40) == 0;
       for (std::uint32_t i = noise.below(8); i > 0 && !isGone; --i) {
@@ -366,15 +368,20 @@ TEST_CASE("damaged messages of viewers harm nobody") {
 
 TEST_CASE("damaged messages of a server give whole levels or an error") {
   const std::vector<Message> good = conversation();
+  // Texts that the conversation doesn't have.
+  const std::array<FromServer, 3> others{Missing{3, "gone"}, Denied{"viewer 2 drives"},
+                                         Refusal{"the token is wrong"}};
   std::uint64_t wholes = 0;
   std::uint64_t refused = 0;
   const test::FuzzTime time(usualSeconds);
   for (std::uint64_t seed = test::fuzzSeed(); !time.isOver(); ++seed) {
     Noise noise(seed);
+    (void)understood<FromServer>(changed(textOf(others[noise.below(3)]), noise), serverMessage);
     Assembly assembly;
     try {
       for (const Message& message : changed(good, noise)) {
         if (message.isText) {
+          (void)understood<FromViewer>(message.bytes, viewerMessage);
           const auto news = understood<FromServer>(message.bytes, serverMessage);
           if (!news) throw Error(ErrorCode::Format, "no message");
           if (const auto* const level = std::get_if<Level>(&*news)) assembly.begin(*level, 64 * mebibyte);

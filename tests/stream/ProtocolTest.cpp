@@ -78,25 +78,6 @@ std::string steerWithCamera(const std::string& position, const std::string& foca
          focalPoint + R"(,"viewAngle":)" + angle + "}}";
 }
 
-std::string text(std::size_t length, test::Noise& noise) {
-  std::string result;
-  for (std::size_t i = 0; i < length; ++i) result += static_cast<char>(noise.below(256));
-  return result;
-}
-
-/// Whether the message was read, or refused as it should be.
-template <typename Read>
-bool isReadOrRefused(const Read& read) {
-  try {
-    read();
-    return true;
-  } catch (const Error& error) {
-    return error.code() == ErrorCode::Format;
-  } catch (...) {
-    return false;
-  }
-}
-
 std::vector<std::byte> message(const Chunk& chunk) {
   const auto head = chunkHead(chunk);
   std::vector<std::byte> bytes(head.size() + chunk.bytes.size());
@@ -197,40 +178,6 @@ TEST_CASE("messages that make no sense are refused") {
     INFO(m);
     CHECK(test::errorOf([&] { serverMessage(m); }).code() == ErrorCode::Format);
   }
-}
-
-TEST_CASE("damaged messages are read or refused") {
-  test::Noise noise(29);
-  std::vector<std::string> seeds;
-  for (const FromViewer& m : viewerMessages()) seeds.push_back(textOf(m));
-  for (const FromServer& m : serverMessages()) seeds.push_back(textOf(m));
-  const std::string marks = "{}[]\",:0-9e.\\untf";
-  std::size_t wrong = 0;
-  for (int i = 0; i < 20000; ++i) {
-    std::string m = seeds[noise.below(static_cast<std::uint32_t>(seeds.size()))];
-    for (std::uint32_t edits = 1 + noise.below(4); edits > 0 && !m.empty(); --edits) {
-      const auto at = noise.below(static_cast<std::uint32_t>(m.size()));
-      switch (noise.below(4)) {
-        case 0:
-          m[at] = static_cast<char>(noise.below(256));
-          break;
-        case 1:
-          m.resize(at);
-          break;
-        case 2:
-          m.insert(at, 1 + noise.below(3), marks[noise.below(static_cast<std::uint32_t>(marks.size()))]);
-          break;
-        default:
-          m.insert(at, m.substr(noise.below(static_cast<std::uint32_t>(m.size())), noise.below(20)));
-      }
-    }
-    if (!isReadOrRefused([&m] { viewerMessage(m); }) || !isReadOrRefused([&m] { serverMessage(m); })) ++wrong;
-  }
-  for (int i = 0; i < 2000; ++i) {
-    const std::string m = text(noise.below(60), noise);
-    if (!isReadOrRefused([&m] { viewerMessage(m); }) || !isReadOrRefused([&m] { serverMessage(m); })) ++wrong;
-  }
-  CHECK(wrong == 0);
 }
 
 TEST_CASE("levels are put together from parts in order alone") {
