@@ -45,6 +45,21 @@ inline Decomposed decompose(const char* field, const glm::ivec3& size, const glm
   return decomposed;
 }
 
+/// The blocks of a field that this rank of `world` holds.
+template <typename World>
+Decomposed dealt(const World& world, const char* field, const glm::ivec3& size, const glm::ivec3& blocks,
+                 synthetic::Layout layout, synthetic::Joint joint = synthetic::Joint::SharedPoints,
+                 ScalarType type = ScalarType::F32) {
+  return decompose(field, size, blocks, layout, joint, type, world.rank(), world.size());
+}
+
+/// All blocks of a field, on one rank.
+inline Decomposed onOneRank(const char* field, const glm::ivec3& size,
+                            const glm::ivec3& blocks = glm::ivec3(1), ScalarType type = ScalarType::F32,
+                            synthetic::Joint joint = synthetic::Joint::SharedPoints) {
+  return decompose(field, size, blocks, synthetic::Layout::OnOneRank, joint, type, 0, 1);
+}
+
 /// Three hues; transparent below a third; `top` is the scalar of full opacity. Unit distance: a twentieth of
 /// the scene.
 inline TransferFunction threeHues(double top, double unitDistance = 0.05) {

@@ -9,7 +9,6 @@
 #include "vdi/pipeline/VdiGenerator.h"
 
 using namespace vdi;
-using synthetic::Joint;
 using synthetic::Layout;
 
 TEST_CASE("blending: several ranks with scattered blocks") {
@@ -21,10 +20,8 @@ TEST_CASE("blending: several ranks with scattered blocks") {
   function.opacities = {{0.0, 0.8}, {0.5, 0.2}, {1.0, 0.9}};
   for (const Layout layout : {Layout::Random, Layout::Interleaved}) {
     const bool shaded = layout == Layout::Random;
-    const auto scattered = test::decompose("turbulence", {34, 30, 28}, {4, 3, 3}, layout, Joint::SharedPoints,
-                                           ScalarType::F32, world.rank(), world.size());
-    const auto whole = test::decompose("turbulence", {34, 30, 28}, {1, 1, 1}, Layout::OnOneRank,
-                                       Joint::SharedPoints, ScalarType::F32, 0, 1);
+    const auto scattered = test::dealt(world, "turbulence", {34, 30, 28}, {4, 3, 3}, layout);
+    const auto whole = test::onOneRank("turbulence", {34, 30, 28});
     generator.setBlocks(scattered.mine);
     alone.setBlocks(whole.mine);
     for (const Blending& blending : {Blending{BlendMode::Maximum, {}}, Blending{BlendMode::Minimum, {}},
@@ -50,8 +47,7 @@ TEST_CASE("blending: several ranks with scattered blocks") {
 TEST_CASE("blending: ranks that have nothing, and a mode that differs") {
   const comm::Communicator world = comm::Communicator::world();
   VdiGenerator generator(gpu::Device::create(gpu::requestFromEnvironment(0)), comm::Communicator::world());
-  const auto whole = test::decompose("turbulence", {12, 12, 12}, {1, 1, 1}, Layout::OnOneRank,
-                                     Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
+  const auto whole = test::dealt(world, "turbulence", {12, 12, 12}, {1, 1, 1}, Layout::OnOneRank);
   generator.setBlocks(whole.mine);
   GenerateSettings settings = test::smallSettings(20, 16);
   for (const BlendMode mode : {BlendMode::Maximum, BlendMode::Minimum, BlendMode::Isosurface}) {

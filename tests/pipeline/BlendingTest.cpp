@@ -20,7 +20,6 @@
 
 using namespace vdi;
 using synthetic::Joint;
-using synthetic::Layout;
 
 namespace {
 
@@ -46,8 +45,7 @@ struct Case {
 };
 
 void checkAgainstReference(VdiGenerator& generator, const Case& c) {
-  const auto decomposed =
-      test::decompose("turbulence", {26, 22, 24}, {2, 2, 2}, Layout::OnOneRank, c.joint, c.type, 0, 1);
+  const auto decomposed = test::onOneRank("turbulence", {26, 22, 24}, {2, 2, 2}, c.type, c.joint);
   const double top = test::topOf(c.type);
   const TransferFunction function = valley(top);
   const Camera camera = test::oblique(c.parallel);

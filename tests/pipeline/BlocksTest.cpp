@@ -9,7 +9,6 @@
 
 using namespace vdi;
 using synthetic::Joint;
-using synthetic::Layout;
 using test::device;
 using test::largestDifference;
 
@@ -52,11 +51,9 @@ TEST_CASE(
 }
 
 TEST_CASE("thousands of small blocks in one pass") {
-  const auto decomposed = test::decompose("turbulence", {61, 61, 61}, {15, 15, 15}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::U8, 0, 1);
+  const auto decomposed = test::onOneRank("turbulence", {61, 61, 61}, {15, 15, 15}, ScalarType::U8);
   CHECK(decomposed.mine.size() == 3375);
-  const auto whole = test::decompose("turbulence", {61, 61, 61}, {1, 1, 1}, Layout::OnOneRank,
-                                     Joint::SharedPoints, ScalarType::U8, 0, 1);
+  const auto whole = test::onOneRank("turbulence", {61, 61, 61}, {1, 1, 1}, ScalarType::U8);
   const TransferFunction function = test::threeHues(80.0);
   const GenerateSettings settings = test::smallSettings();
   VdiGenerator many(device(), comm::Communicator::serial());
@@ -68,8 +65,7 @@ TEST_CASE("thousands of small blocks in one pass") {
 }
 
 TEST_CASE("a block cut to fit the device's images shows no seam") {
-  const auto whole = test::decompose("turbulence", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank,
-                                     Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto whole = test::onOneRank("turbulence", {40, 40, 40});
   // A steep function, so that samples beside a cut depend on the values beyond it.
   TransferFunction function = test::threeHues(1.0);
   function.opacities = {{0.0, 0.0}, {0.5, 0.0}, {0.52, 1.0}, {0.54, 0.0}, {1.0, 0.0}};

@@ -11,8 +11,6 @@
 #include "vdi/reference/Reference.h"
 
 using namespace vdi;
-using synthetic::Joint;
-using synthetic::Layout;
 
 namespace {
 
@@ -57,8 +55,7 @@ double errorOf(const Image& seen, const Image& truth) {
 }  // namespace
 
 TEST_CASE("box faces: views along them are the reference's, and nearer to the volume than without") {
-  const auto decomposed = test::decompose("turbulence", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank("turbulence", {24, 24, 24});
   VdiGenerator generator(test::device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
   const GenerateSettings settings = test::smallSettings(48, 40);
@@ -90,8 +87,7 @@ TEST_CASE("box faces: views along them are the reference's, and nearer to the vo
 }
 
 TEST_CASE("box faces: the picture of V_O is the same") {
-  const auto decomposed = test::decompose("ramp", {20, 24, 22}, {1, 1, 1}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank("ramp", {20, 24, 22});
   VdiGenerator generator(test::device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
   const Camera camera = headOn(GENERATE(false, true));

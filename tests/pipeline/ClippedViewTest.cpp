@@ -13,14 +13,11 @@
 #include "vdi/reference/Reference.h"
 
 using namespace vdi;
-using synthetic::Joint;
-using synthetic::Layout;
 
 namespace {
 
 Vdi makeVdi(const Camera& camera) {
-  const auto decomposed = test::decompose("turbulence", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank("turbulence", {24, 24, 24});
   VdiGenerator generator(test::device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
   return *generator.generate(camera, test::threeHues(0.8), test::smallSettings(56, 44));

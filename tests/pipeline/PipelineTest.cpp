@@ -37,8 +37,7 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
                                   ScalarType::U32, ScalarType::I32, ScalarType::F32, ScalarType::F64}) {
       if (parallel && type != ScalarType::F32) continue;
       INFO(toString(type) << (parallel ? ", parallel" : ", perspective"));
-      const auto decomposed = test::decompose("turbulence", {26, 22, 24}, {2, 2, 2}, Layout::OnOneRank,
-                                              Joint::SharedPoints, type, 0, 1);
+      const auto decomposed = test::onOneRank("turbulence", {26, 22, 24}, {2, 2, 2}, type);
       const TransferFunction function = test::threeHues(test::topOf(type) * 0.8);
       // Odd sizes: the last row and column lie beyond the last counted ones.
       const GenerateSettings settings = test::smallSettings(47, 35, 8);
@@ -101,8 +100,7 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
 TEST_CASE("a margin: the reference's lists around the picture, and no cut edge when the view turns") {
   for (const bool parallel : {false, true}) {
     INFO((parallel ? "parallel" : "perspective"));
-    const auto decomposed = test::decompose("turbulence", {26, 22, 24}, {2, 2, 2}, Layout::OnOneRank,
-                                            Joint::SharedPoints, ScalarType::F32, 0, 1);
+    const auto decomposed = test::onOneRank("turbulence", {26, 22, 24}, {2, 2, 2});
     const TransferFunction function = test::threeHues(0.8);
     VdiGenerator generator(device(), comm::Communicator::serial());
     generator.setBlocks(decomposed.mine);
@@ -148,8 +146,7 @@ TEST_CASE("a margin: the reference's lists around the picture, and no cut edge w
 
 TEST_CASE("macrocells that rays pass and samples that are counted as one: as in the reference") {
   // Each axis has several macrocells, most of them empty.
-  const auto decomposed = test::decompose("coil", {70, 75, 66}, {1, 2, 1}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::U8, 0, 1);
+  const auto decomposed = test::onOneRank("coil", {70, 75, 66}, {1, 2, 1}, ScalarType::U8);
   VdiGenerator generator(device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
   GenerateSettings settings = test::smallSettings(41, 33, 6);
@@ -176,8 +173,7 @@ TEST_CASE("macrocells that rays pass and samples that are counted as one: as in 
 }
 
 TEST_CASE("rays go on behind material of opacity 1, unless they must end") {
-  const auto decomposed = test::decompose("shells", {32, 32, 32}, {1, 1, 1}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank("shells", {32, 32, 32});
   TransferFunction function = test::threeHues(1.0);
   function.opacities = {{0.0, 0.0}, {0.5, 0.0}, {0.6, 1.0}, {1.0, 1.0}};
   GenerateSettings settings = test::smallSettings(40, 30, 12);
@@ -227,8 +223,7 @@ TEST_CASE("programs for GPUs give the same lists as those for CPUs") {
 }
 
 TEST_CASE("a VDI equals DVR at V_O and stays close around it") {
-  const auto decomposed = test::decompose("mixing", {48, 48, 48}, {2, 2, 2}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank("mixing", {48, 48, 48}, {2, 2, 2});
   const TransferFunction function = test::threeHues(1.0);
   const GenerateSettings settings = test::smallSettings(128, 96, 20);
   const Camera camera = test::oblique();

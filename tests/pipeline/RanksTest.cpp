@@ -76,10 +76,8 @@ TEST_CASE("the flat image and DVR of N ranks equal the DVR of one") {
     INFO(c.name);
     // A field with structure up to the domain's faces, so that a lost or repeated sample is visible.
     const glm::ivec3 size{34, 30, 37};
-    const auto decomposed =
-        test::decompose("turbulence", size, c.blocks, c.layout, c.joint, c.type, world.rank(), world.size());
-    const auto whole =
-        test::decompose("turbulence", size, {1, 1, 1}, Layout::OnOneRank, c.joint, c.type, 0, 1);
+    const auto decomposed = test::dealt(world, "turbulence", size, c.blocks, c.layout, c.joint, c.type);
+    const auto whole = test::onOneRank("turbulence", size, {1, 1, 1}, c.type, c.joint);
     const TransferFunction function = test::threeHues(test::topOf(c.type) * 0.8);
     const GenerateSettings settings = test::smallSettings();
     const Camera camera = test::oblique(c.parallel);
@@ -118,10 +116,8 @@ TEST_CASE("an automatic sampling rate: the one that the function needs, and the 
   VdiGenerator one(device(), comm::Communicator::serial());
   VdiGenerator many(device(), comm::Communicator::world());
   const glm::ivec3 size{26, 24, 25};
-  const auto whole = test::decompose("turbulence", size, {1, 1, 1}, Layout::OnOneRank, Joint::SharedPoints,
-                                     ScalarType::F32, 0, 1);
-  const auto dealt = test::decompose("turbulence", size, {3, 2, 4}, Layout::Random, Joint::Gap,
-                                     ScalarType::F32, world.rank(), world.size());
+  const auto whole = test::onOneRank("turbulence", size);
+  const auto dealt = test::dealt(world, "turbulence", size, {3, 2, 4}, Layout::Random, Joint::Gap);
   one.setBlocks(whole.mine);
   many.setBlocks(dealt.mine);
   // In other units the same function is steeper: it passes through its hues many times.
@@ -158,11 +154,10 @@ TEST_CASE("shaded: the picture and VDI of N ranks are those of one") {
   VdiGenerator one(device(), comm::Communicator::serial());
   VdiGenerator many(device(), comm::Communicator::world());
   for (const Case& c : cases) {
-    const auto decomposed = test::decompose("turbulence", {34, 30, 37}, c.blocks, c.layout, c.joint, c.type,
-                                            world.rank(), world.size());
+    const auto decomposed =
+        test::dealt(world, "turbulence", {34, 30, 37}, c.blocks, c.layout, c.joint, c.type);
     many.setBlocks(decomposed.mine);
-    const auto whole =
-        test::decompose("turbulence", {34, 30, 37}, {1, 1, 1}, Layout::OnOneRank, c.joint, c.type, 0, 1);
+    const auto whole = test::onOneRank("turbulence", {34, 30, 37}, {1, 1, 1}, c.type, c.joint);
     if (root) one.setBlocks(whole.mine);
     const TransferFunction function = test::threeHues(test::topOf(c.type) * 0.8);
     const Camera camera = test::oblique(c.parallel);
@@ -196,10 +191,8 @@ TEST_CASE("a margin on N ranks: the lists of one rank, and its picture") {
   const bool root = world.rank() == 0;
   VdiGenerator one(device(), comm::Communicator::serial());
   VdiGenerator many(device(), comm::Communicator::world());
-  const auto decomposed = test::decompose("turbulence", {34, 30, 37}, {2, 2, 2}, Layout::Interleaved,
-                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
-  const auto whole = test::decompose("turbulence", {34, 30, 37}, {1, 1, 1}, Layout::OnOneRank,
-                                     Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::dealt(world, "turbulence", {34, 30, 37}, {2, 2, 2}, Layout::Interleaved);
+  const auto whole = test::onOneRank("turbulence", {34, 30, 37});
   Camera camera = test::oblique();
   camera.viewAngle /= 3.0;
   GenerateSettings settings = test::smallSettings(32, 24);
@@ -229,8 +222,7 @@ TEST_CASE("a margin on N ranks: the lists of one rank, and its picture") {
 TEST_CASE(
     "a total budget over all ranks: the picture of one, as many supersegments as equally, unequal lists") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto decomposed = test::decompose("turbulence", {34, 30, 37}, {3, 3, 3}, Layout::Random,
-                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
+  const auto decomposed = test::dealt(world, "turbulence", {34, 30, 37}, {3, 3, 3}, Layout::Random);
   VdiGenerator generator(device(), comm::Communicator::world());
   generator.setBlocks(decomposed.mine);
   GenerateSettings settings = test::smallSettings(61, 45, 5);
@@ -272,8 +264,8 @@ class FirstMade {
 
 TEST_CASE("ways between ranks: shared memory, messages, both, staging memory: the same VDI and picture") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto decomposed = test::decompose("turbulence", {34, 30, 37}, {4, 3, 4}, Layout::Random,
-                                          Joint::SharedPoints, ScalarType::U8, world.rank(), world.size());
+  const auto decomposed = test::dealt(world, "turbulence", {34, 30, 37}, {4, 3, 4}, Layout::Random,
+                                      Joint::SharedPoints, ScalarType::U8);
   const GenerateSettings settings = test::smallSettings(61, 45, 6);
   const TransferFunction function = test::threeHues(80.0);
   gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
@@ -324,8 +316,8 @@ TEST_CASE("rank 0's environment says how all ranks work, and what makes no sense
 
 TEST_CASE("lists of more than 255 supersegments: both ways, and the picture of one rank") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto decomposed = test::decompose("turbulence", {34, 30, 37}, {4, 3, 4}, Layout::Random,
-                                          Joint::SharedPoints, ScalarType::U8, world.rank(), world.size());
+  const auto decomposed = test::dealt(world, "turbulence", {34, 30, 37}, {4, 3, 4}, Layout::Random,
+                                      Joint::SharedPoints, ScalarType::U8);
   constexpr std::uint32_t budget = 1024;  // enough to make each sample a supersegment
   GenerateSettings settings = test::smallSettings(9, 7, budget);
   settings.samplesPerVoxel = 32.0;
@@ -351,16 +343,14 @@ TEST_CASE("lists of more than 255 supersegments: both ways, and the picture of o
 
 TEST_CASE("4096 blocks dealt at random: lists of many runs, and the picture of one rank") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto decomposed = test::decompose("turbulence", {49, 49, 49}, {16, 16, 16}, Layout::Random,
-                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
+  const auto decomposed = test::dealt(world, "turbulence", {49, 49, 49}, {16, 16, 16}, Layout::Random);
   const GenerateSettings settings = test::smallSettings(56, 44, 5);
   VdiGenerator many(device(), comm::Communicator::world());
   many.setBlocks(decomposed.mine);
   const auto volume = many.renderVolume(test::oblique(), test::threeHues(0.8), settings);
   const auto vdi = many.generate(test::oblique(), test::threeHues(0.8), settings);
   if (world.rank() != 0) return;
-  const auto whole = test::decompose("turbulence", {49, 49, 49}, {1, 1, 1}, Layout::OnOneRank,
-                                     Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto whole = test::onOneRank("turbulence", {49, 49, 49});
   VdiGenerator one(device(), comm::Communicator::serial());
   one.setBlocks(whole.mine);
   const auto truth = one.renderVolume(test::oblique(), test::threeHues(0.8), settings);
@@ -389,8 +379,7 @@ TEST_CASE("all ranks together send little more than one rank makes") {
 
 TEST_CASE("a large picture in bands, most of which are empty: the picture of one rank") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto parts = test::decompose("shells", {16, 16, 16}, {2, 2, 2}, Layout::Interleaved, Joint::Cells,
-                                     ScalarType::F32, world.rank(), world.size());
+  const auto parts = test::dealt(world, "shells", {16, 16, 16}, {2, 2, 2}, Layout::Interleaved, Joint::Cells);
   const GenerateSettings settings = test::smallSettings(640, 360, 5);
   Camera camera = test::oblique(true);
   camera.parallelScale *= 6.0;  // the upper and lower bands have many lists, all empty
@@ -399,8 +388,7 @@ TEST_CASE("a large picture in bands, most of which are empty: the picture of one
   const auto vdi = many.generate(camera, test::threeHues(0.8), settings);
   const auto volume = many.renderVolume(camera, test::threeHues(0.8), settings);
   if (world.rank() != 0) return;
-  const auto whole = test::decompose("shells", {16, 16, 16}, {1, 1, 1}, Layout::OnOneRank, Joint::Cells,
-                                     ScalarType::F32, 0, 1);
+  const auto whole = test::onOneRank("shells", {16, 16, 16}, {1, 1, 1}, ScalarType::F32, Joint::Cells);
   VdiGenerator one(device(), comm::Communicator::serial());
   one.setBlocks(whole.mine);
   const auto truth = one.renderVolume(camera, test::threeHues(0.8), settings);
@@ -411,8 +399,7 @@ TEST_CASE("a large picture in bands, most of which are empty: the picture of one
 
 TEST_CASE("tiny pictures: more ranks than rows and pixels") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto decomposed = test::decompose("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved,
-                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
+  const auto decomposed = test::dealt(world, "shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved);
   VdiGenerator generator(device(), comm::Communicator::world());
   generator.setBlocks(decomposed.mine);
   for (const auto& [width, height] : {std::pair(1, 1), std::pair(3, 1), std::pair(1, 2)}) {
@@ -429,8 +416,7 @@ TEST_CASE("tiny pictures: more ranks than rows and pixels") {
 
 TEST_CASE("a failing rank leaves the others running, and the next frame works") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto decomposed = test::decompose("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved,
-                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
+  const auto decomposed = test::dealt(world, "shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved);
   VdiGenerator generator(device(), comm::Communicator::world());
   auto broken = decomposed.mine;
   if (world.rank() == world.size() - 1) {
@@ -447,8 +433,7 @@ TEST_CASE("a failing rank leaves the others running, and the next frame works") 
 TEST_CASE("frames that overlap are those that are made alone") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposedOf = [&](const char* field) {
-    return test::decompose(field, {30, 34, 27}, {3, 2, 3}, Layout::Random, Joint::SharedPoints,
-                           ScalarType::F32, world.rank(), world.size());
+    return test::dealt(world, field, {30, 34, 27}, {3, 2, 3}, Layout::Random);
   };
   const auto first = decomposedOf("turbulence");
   const auto second = decomposedOf("shells");
@@ -506,8 +491,7 @@ TEST_CASE("frames that overlap are those that are made alone") {
 
 TEST_CASE("frames that are never finished, and frames under way when a rank fails") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto decomposed = test::decompose("turbulence", {24, 24, 24}, {2, 2, 2}, Layout::Random,
-                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
+  const auto decomposed = test::dealt(world, "turbulence", {24, 24, 24}, {2, 2, 2}, Layout::Random);
   const TransferFunction function = test::threeHues(0.8);
   const GenerateSettings settings = test::smallSettings();
   VdiGenerator generator(device(), comm::Communicator::world());
@@ -545,8 +529,7 @@ TEST_CASE("frames that are never finished, and frames under way when a rank fail
 
 TEST_CASE("a frame cancelled late leaves nothing in the next one's memory") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto decomposed = test::decompose("turbulence", {24, 24, 24}, {2, 2, 2}, Layout::Random,
-                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
+  const auto decomposed = test::dealt(world, "turbulence", {24, 24, 24}, {2, 2, 2}, Layout::Random);
   gpu::DeviceRequest request = gpu::requestFromEnvironment(0);
   request.importsHostMemory = false;  // staged data must also arrive
   const auto copying = gpu::Device::create(request);
@@ -571,8 +554,7 @@ TEST_CASE("a frame cancelled late leaves nothing in the next one's memory") {
 
 TEST_CASE("a frame of threads that may not call MPI: the same, also after one that was stopped") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto decomposed = test::decompose("turbulence", {24, 24, 24}, {2, 2, 2}, Layout::Random,
-                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
+  const auto decomposed = test::dealt(world, "turbulence", {24, 24, 24}, {2, 2, 2}, Layout::Random);
   const TransferFunction function = test::threeHues(80.0);
   const GenerateSettings settings = test::smallSettings(61, 45, 6);
   VdiGenerator generator(device(), comm::Communicator::world());
@@ -602,8 +584,7 @@ TEST_CASE("a frame of threads that may not call MPI: the same, also after one th
 TEST_CASE("the next step, while this one is shown: all ranks advance, or none does") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposedOf = [&](const char* field) {
-    return test::decompose(field, {34, 30, 37}, {3, 2, 3}, Layout::Random, Joint::Gap, ScalarType::F32,
-                           world.rank(), world.size());
+    return test::dealt(world, field, {34, 30, 37}, {3, 2, 3}, Layout::Random, Joint::Gap);
   };
   const auto first = decomposedOf("turbulence");
   const auto second = decomposedOf("shells");
@@ -636,8 +617,7 @@ TEST_CASE("the next step, while this one is shown: all ranks advance, or none do
 
 TEST_CASE("parameters that differ between ranks are refused on every rank, by name") {
   const comm::Communicator world = comm::Communicator::world();
-  const auto decomposed = test::decompose("shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved,
-                                          Joint::SharedPoints, ScalarType::F32, world.rank(), world.size());
+  const auto decomposed = test::dealt(world, "shells", {12, 12, 12}, {2, 2, 2}, Layout::Interleaved);
   VdiGenerator generator(device(), comm::Communicator::world());
   generator.setBlocks(decomposed.mine);
   const GenerateSettings settings = test::smallSettings(16, 12);

@@ -19,8 +19,6 @@
 #include "vdi/reference/Reference.h"
 
 using namespace vdi;
-using synthetic::Joint;
-using synthetic::Layout;
 
 namespace {
 
@@ -38,8 +36,7 @@ TEST_CASE("region: DVR and lists of the device are the reference's") {
   for (const auto& device : devices) {
     VdiGenerator generator(device, comm::Communicator::serial());
     for (const bool parallel : {false, true}) {
-      const auto decomposed = test::decompose("turbulence", {26, 22, 24}, {2, 2, 2}, Layout::OnOneRank,
-                                              Joint::SharedPoints, ScalarType::F32, 0, 1);
+      const auto decomposed = test::onOneRank("turbulence", {26, 22, 24}, {2, 2, 2});
       const TransferFunction function = test::threeHues(0.8);
       GenerateSettings settings = test::smallSettings(31, 23, 8);
       settings.precision = Precision::Full;
@@ -188,8 +185,7 @@ TEST_CASE("region: the optical model's integral, with light at the cut") {
 }
 
 TEST_CASE("region: an empty rest, and refusals by name") {
-  const auto decomposed = test::decompose("turbulence", {12, 12, 12}, {1, 1, 1}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank("turbulence", {12, 12, 12});
   VdiGenerator generator(test::device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
   Region beside;

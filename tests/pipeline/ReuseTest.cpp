@@ -9,14 +9,11 @@
 #include "vdi/pipeline/VdiRenderer.h"
 
 using namespace vdi;
-using synthetic::Joint;
-using synthetic::Layout;
 using test::device;
 using test::largestDifference;
 
 TEST_CASE("a VDI in the memory of another one, whatever its precision and size were, is the same") {
-  const auto decomposed = test::decompose("mixing", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank("mixing", {24, 24, 24});
   VdiGenerator generator(device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
   GenerateSettings settings = test::smallSettings(40, 30, 5);
@@ -41,8 +38,7 @@ TEST_CASE("a VDI in the memory of another one, whatever its precision and size w
 }
 
 TEST_CASE("a picture in the memory of another one is the same") {
-  const auto decomposed = test::decompose("mixing", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank("mixing", {24, 24, 24});
   VdiGenerator generator(device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
   const auto volumeOf = [&](int width, int height) {
@@ -71,8 +67,7 @@ TEST_CASE("VDIs set before the last one's upload has ended are rendered whole") 
   const Camera camera = test::oblique();
   std::vector<Vdi> vdis;
   for (const char* field : {"mixing", "sphere", "turbulence"}) {
-    const auto decomposed = test::decompose(field, {32, 32, 32}, {1, 1, 1}, Layout::OnOneRank,
-                                            Joint::SharedPoints, ScalarType::F32, 0, 1);
+    const auto decomposed = test::onOneRank(field, {32, 32, 32});
     generator.setBlocks(decomposed.mine);
     GenerateSettings settings = test::smallSettings(96 + 32 * static_cast<int>(vdis.size()), 80, 10);
     settings.precision = vdis.size() == 1 ? Precision::Full : Precision::Compact;
@@ -93,8 +88,7 @@ TEST_CASE("VDIs set before the last one's upload has ended are rendered whole") 
 }
 
 TEST_CASE("frames of the same size reuse everything") {
-  const auto decomposed = test::decompose("shells", {20, 20, 20}, {2, 2, 2}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank("shells", {20, 20, 20}, {2, 2, 2});
   const GenerateSettings settings = test::smallSettings();
   VdiGenerator generator(device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);

@@ -13,7 +13,6 @@
 
 using namespace vdi;
 using synthetic::Joint;
-using synthetic::Layout;
 using test::device;
 
 namespace {
@@ -296,8 +295,7 @@ TEST_CASE("voxels 50 times as long as wide") {
 }
 
 TEST_CASE("one supersegment a list and 255, pictures of one pixel and of one row") {
-  const auto decomposed = test::decompose("turbulence", {30, 30, 30}, {2, 2, 2}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::U8, 0, 1);
+  const auto decomposed = test::onOneRank("turbulence", {30, 30, 30}, {2, 2, 2}, ScalarType::U8);
   VdiGenerator generator(device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
   const TransferFunction function = test::threeHues(80.0);

@@ -15,15 +15,12 @@
 #include "vdi/pipeline/VdiRenderer.h"
 
 using namespace vdi;
-using synthetic::Joint;
-using synthetic::Layout;
 using test::device;
 
 namespace {
 
 Vdi makeVdi(const char* field, int width, int height, const Camera& camera, Precision precision) {
-  const auto decomposed = test::decompose(field, {32, 32, 32}, {1, 1, 1}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank(field, {32, 32, 32});
   VdiGenerator generator(device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
   GenerateSettings settings = test::smallSettings(width, height, 10);
@@ -44,8 +41,7 @@ ImageDifference differenceOf(const Image& a, const Image& b) {
 }  // namespace
 
 TEST_CASE("a VDI that is shown from the device's lists is the one that goes by way of the host") {
-  const auto decomposed = test::decompose("turbulence", {40, 36, 32}, {2, 2, 2}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank("turbulence", {40, 36, 32}, {2, 2, 2});
   const auto other = gpu::Device::create(gpu::requestFromEnvironment(0));
   VdiRenderer renderer(device());
   VdiRenderer elsewhere(other);

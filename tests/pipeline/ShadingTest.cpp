@@ -24,7 +24,6 @@
 
 using namespace vdi;
 using synthetic::Joint;
-using synthetic::Layout;
 using test::integral;
 using test::Lamp;
 using test::Lattice;
@@ -60,8 +59,7 @@ TEST_CASE("shading: DVR and lists of the device are the reference's") {
     VdiGenerator generator(device, comm::Communicator::serial());
     for (const Case& c : cases) {
       INFO(toString(c.type));
-      const auto decomposed =
-          test::decompose("turbulence", {26, 22, 24}, {2, 2, 2}, Layout::OnOneRank, c.joint, c.type, 0, 1);
+      const auto decomposed = test::onOneRank("turbulence", {26, 22, 24}, {2, 2, 2}, c.type, c.joint);
       const TransferFunction function = test::threeHues(test::topOf(c.type) * 0.8);
       GenerateSettings settings = test::smallSettings(31, 23, 8);
       settings.precision = Precision::Full;

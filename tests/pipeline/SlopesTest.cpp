@@ -15,8 +15,7 @@ using reference::Slopes;
 
 TEST_CASE("slopes of faces: the device's are the reference's") {
   const bool parallel = GENERATE(false, true);
-  const auto decomposed = test::decompose("shells", {30, 26, 28}, {1, 1, 1}, synthetic::Layout::OnOneRank,
-                                          synthetic::Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank("shells", {30, 26, 28});
   VdiGenerator generator(test::device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
   GenerateSettings settings = test::smallSettings(61, 43, 8);

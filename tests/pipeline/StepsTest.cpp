@@ -12,8 +12,6 @@
 #include "vdi/pipeline/VdiGenerator.h"
 
 using namespace vdi;
-using synthetic::Joint;
-using synthetic::Layout;
 using test::device;
 
 namespace {
@@ -25,7 +23,7 @@ struct TimeStep {
 
 TimeStep timeStep(const char* field, const glm::ivec3& size, ScalarType type) {
   return {
-      test::decompose(field, size, {2, 1, 2}, Layout::OnOneRank, Joint::SharedPoints, type, 0, 1).mine,
+      test::onOneRank(field, size, {2, 1, 2}, type).mine,
       type,
   };
 }

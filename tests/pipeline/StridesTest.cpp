@@ -23,7 +23,7 @@ namespace {
 
 std::vector<Block> decomposed(const glm::ivec3& size, const glm::ivec3& blocks, Joint joint,
                               ScalarType type) {
-  return test::decompose("turbulence", size, blocks, synthetic::Layout::OnOneRank, joint, type, 0, 1).mine;
+  return test::onOneRank("turbulence", size, blocks, type, joint).mine;
 }
 
 CompactLists listsOf(const std::vector<Block>& blocks, ScalarType type) {

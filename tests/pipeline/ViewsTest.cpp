@@ -13,8 +13,6 @@
 #include "vdi/reference/Reference.h"
 
 using namespace vdi;
-using synthetic::Joint;
-using synthetic::Layout;
 using test::depthsThatDiffer;
 using test::device;
 using test::deviceAsGpu;
@@ -22,8 +20,7 @@ using test::isView;
 using test::rounding;
 
 TEST_CASE("rays leave a picture within a tile of lists, through material at its edge") {
-  const auto decomposed = test::decompose("interface", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank("interface", {24, 24, 24});
   VdiGenerator generator(device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
   Camera camera = test::oblique();
@@ -44,8 +41,7 @@ TEST_CASE("rays leave a picture within a tile of lists, through material at its 
 }
 
 TEST_CASE("bytes of a view are those of its floats, whichever was asked for before") {
-  const auto decomposed = test::decompose("shells", {24, 24, 24}, {1, 1, 1}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank("shells", {24, 24, 24});
   VdiGenerator generator(device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
   VdiRenderer renderer(device());
@@ -79,8 +75,7 @@ TEST_CASE("bytes of a view are those of its floats, whichever was asked for befo
 }
 
 TEST_CASE("views of a sparse VDI, most of whose tiles are skipped: as in the reference") {
-  const auto decomposed = test::decompose("coil", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::U8, 0, 1);
+  const auto decomposed = test::onOneRank("coil", {40, 40, 40}, {1, 1, 1}, ScalarType::U8);
   const bool parallel = GENERATE(false, true);
   const Camera camera = test::oblique(parallel);
   VdiGenerator generator(device(), comm::Communicator::serial());
@@ -132,8 +127,7 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are skipped: as in the ref
 }
 
 TEST_CASE("rays that end at objects, of any part of an image plane: as in the reference") {
-  const auto decomposed = test::decompose("coil", {40, 40, 40}, {1, 1, 1}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::U8, 0, 1);
+  const auto decomposed = test::onOneRank("coil", {40, 40, 40}, {1, 1, 1}, ScalarType::U8);
   const bool parallel = GENERATE(false, true);
   const Camera camera = test::oblique(parallel);
   VdiGenerator generator(device(), comm::Communicator::serial());
@@ -225,8 +219,7 @@ TEST_CASE("a ray that ends within a supersegment sees the part of it in front") 
 }
 
 TEST_CASE("a picture of more tiles than a device has workgroups side by side") {
-  const auto decomposed = test::decompose("ramp", {8, 8, 8}, {1, 1, 1}, Layout::OnOneRank,
-                                          Joint::SharedPoints, ScalarType::F32, 0, 1);
+  const auto decomposed = test::onOneRank("ramp", {8, 8, 8});
   Camera camera = test::oblique(true);
   camera.parallelScale = 0.1;  // the volume surrounds the camera
   VdiGenerator generator(device(), comm::Communicator::serial());

@@ -15,7 +15,6 @@
 #include "vdi/pipeline/VdiGenerator.h"
 
 using namespace vdi;
-using synthetic::Joint;
 using synthetic::Layout;
 using test::device;
 namespace fs = std::filesystem;
@@ -50,9 +49,7 @@ TEST_CASE("the file of a frame that all ranks write is that of the gathered fram
   const fs::path path = folder.path() / "f.vdi";
   VdiGenerator generator(device(), comm::Communicator::world());
   const TransferFunction function = test::threeHues(0.8);
-  generator.setBlocks(test::decompose("turbulence", {24, 20, 22}, {3, 2, 3}, Layout::Random,
-                                      Joint::SharedPoints, ScalarType::F32, world.rank(), world.size())
-                          .mine);
+  generator.setBlocks(test::dealt(world, "turbulence", {24, 20, 22}, {3, 2, 3}, Layout::Random).mine);
   for (const Case& c : cases) {
     INFO(c.name);
     GenerateSettings settings = test::smallSettings(c.width, c.height, 6);
