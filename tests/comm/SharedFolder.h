@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "tests/io/Samples.h"
+#include "tests/TemporaryFolder.h"
 #include "vdi/comm/Communicator.h"
 
 namespace vdi::test {

@@ -1,12 +1,12 @@
 // JSON with source positions: refusals name the position, and a hostile document costs little.
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 #include <string>
 
 #include "tests/Catch.h"
+#include "tests/TemporaryFolder.h"
 #include "vdi/config/Json.h"
 #include "vdi/core/Error.h"
 
@@ -76,9 +76,8 @@ TEST_CASE("a document beyond the limits is refused") {
 }
 
 TEST_CASE("files that aren't read") {
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("vdi-json-" + std::to_string(::getpid()));
-  std::filesystem::create_directory(folder);
+  const test::TemporaryFolder temporary;
+  const std::filesystem::path& folder = temporary.path();
   const std::string pipe = (folder / "pipe").string();
   REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
   CHECK_THROWS_AS(config::readJsonText(pipe), Error);  // and doesn't wait for a writer
@@ -88,5 +87,4 @@ TEST_CASE("files that aren't read") {
   std::ofstream(large).close();
   std::filesystem::resize_file(large, std::uintmax_t{1} << 30);  // has no blocks
   CHECK_THROWS_WITH(config::readJsonText(large), test::ContainsSubstring("the file has 1073741824 bytes"));
-  std::filesystem::remove_all(folder);
 }

@@ -1,6 +1,4 @@
 // Fields that vdi.json may have, and mistakes that are refused.
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -12,6 +10,7 @@
 #include <vector>
 
 #include "tests/Catch.h"
+#include "tests/TemporaryFolder.h"
 #include "vdi/config/Run.h"
 #include "vdi/config/Schedule.h"
 #include "vdi/core/Error.h"
@@ -403,7 +402,8 @@ TEST_CASE("frames take their share of the time at most") {
 }
 
 TEST_CASE("what is in the way of a run is named") {
-  const auto folder = std::filesystem::temp_directory_path() / ("vdi_run_test_" + std::to_string(::getpid()));
+  const test::TemporaryFolder temporary;
+  const std::filesystem::path& folder = temporary.path();
   std::filesystem::create_directories(folder / "a_7" / "b");
   const auto touch = [&](const char* name) { std::ofstream(folder / name) << "x"; };
   const auto at = [&](const std::string& pattern) { return FilePattern((folder / pattern).string()); };
@@ -430,7 +430,6 @@ TEST_CASE("what is in the way of a run is named") {
   touch("run.jsonl");
   CHECK_THROWS_WITH(config::requireNothingInTheWay(parseRun(log, "vdi.json")),
                     test::ContainsSubstring("run.jsonl"));
-  std::filesystem::remove_all(folder);
 }
 
 TEST_CASE("text is told from a file's name") {

@@ -13,6 +13,7 @@
 #include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/FuzzTime.h"
+#include "tests/TemporaryFolder.h"
 #include "vdi/core/Error.h"
 #include "vdi/gpu/Commands.h"
 #include "vdi/gpu/Device.h"
@@ -418,30 +419,17 @@ std::vector<std::byte> cacheData(const PipelineCacheKey& key, std::size_t size) 
   return data;
 }
 
-/// A new folder, which goes with this object.
-struct Folder {
-  std::filesystem::path path;
-  Folder() {
-    std::string name = (std::filesystem::temp_directory_path() / "vdi-cache-XXXXXX").string();
-    REQUIRE(mkdtemp(name.data()) != nullptr);
-    path = name;
-  }
-  ~Folder() { std::filesystem::remove_all(path); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  Folder(Folder&&) = delete;
-  Folder& operator=(Folder&&) = delete;
-  std::filesystem::path onlyFile() const {
-    return *std::filesystem::directory_iterator(path / "deep" / "er");
-  }
-};
+/// The only file of a cache in a folder below this one.
+std::filesystem::path onlyFile(const test::TemporaryFolder& folder) {
+  return *std::filesystem::directory_iterator(folder.path() / "deep" / "er");
+}
 
 }  // namespace
 
 TEST_CASE("compiled shaders come back from their file, and only those of the same driver and device") {
-  const Folder folder;
+  const test::TemporaryFolder folder;
   PipelineCacheKey key{1, 2, 3, {4}, {5}};
-  const PipelineCacheFile file((folder.path / "deep" / "er").string(), key);
+  const PipelineCacheFile file((folder.path() / "deep" / "er").string(), key);
   CHECK(file.read().empty());
   const std::vector<std::byte> data = cacheData(key, 1000);
   file.write(data);
@@ -455,41 +443,41 @@ TEST_CASE("compiled shaders come back from their file, and only those of the sam
                           PipelineCacheKey{1, 2, 9, {4}, {5}}, PipelineCacheKey{1, 2, 3, {9}, {5}},
                           PipelineCacheKey{1, 2, 3, {4}, {9}}};
   for (const PipelineCacheKey& other : others)
-    CHECK(PipelineCacheFile((folder.path / "deep" / "er").string(), other).read().empty());
+    CHECK(PipelineCacheFile((folder.path() / "deep" / "er").string(), other).read().empty());
   // Another device's data under this name, as after a mistake of the user's.
-  PipelineCacheFile(folder.path.string(), others[3]).write(cacheData(others[3], 10));
+  PipelineCacheFile(folder.path().string(), others[3]).write(cacheData(others[3], 10));
   std::filesystem::path foreign;
-  for (const auto& entry : std::filesystem::directory_iterator(folder.path)) {
+  for (const auto& entry : std::filesystem::directory_iterator(folder.path())) {
     if (entry.is_regular_file()) foreign = entry.path();
   }
-  std::filesystem::copy_file(foreign, folder.onlyFile(), std::filesystem::copy_options::overwrite_existing);
+  std::filesystem::copy_file(foreign, onlyFile(folder), std::filesystem::copy_options::overwrite_existing);
   CHECK(file.read().empty());
 }
 
 TEST_CASE("a folder that can't be written, or none, only means that nothing is kept") {
-  const Folder folder;
+  const test::TemporaryFolder folder;
   const PipelineCacheKey key{1, 2, 3, {4}, {5}};
-  std::ofstream(folder.path / "file") << "no folder";
+  std::ofstream(folder.path() / "file") << "no folder";
   for (const std::string& place :
-       {std::string(), (folder.path / "file").string(), std::string("/proc/none")}) {
+       {std::string(), (folder.path() / "file").string(), std::string("/proc/none")}) {
     const PipelineCacheFile file(place, key);
     file.write(cacheData(key, 100));
     CHECK(file.read().empty());
   }
-  std::filesystem::create_directories(folder.path / "deep" / "er");
-  const PipelineCacheFile file((folder.path / "deep" / "er").string(), key);
+  std::filesystem::create_directories(folder.path() / "deep" / "er");
+  const PipelineCacheFile file((folder.path() / "deep" / "er").string(), key);
   file.write(cacheData(key, 100));
-  std::filesystem::remove(folder.onlyFile());
-  std::filesystem::create_directory(folder.path / "deep" / "er" / "x");
+  std::filesystem::remove(onlyFile(folder));
+  std::filesystem::create_directory(folder.path() / "deep" / "er" / "x");
   CHECK(file.read().empty());
 }
 
 TEST_CASE("damaged files of compiled shaders are ignored") {
-  const Folder folder;
+  const test::TemporaryFolder folder;
   const PipelineCacheKey key{1, 2, 3, {4}, {5}};
-  const PipelineCacheFile file((folder.path / "deep" / "er").string(), key);
+  const PipelineCacheFile file((folder.path() / "deep" / "er").string(), key);
   file.write(cacheData(key, 500));
-  const std::filesystem::path path = folder.onlyFile();
+  const std::filesystem::path path = onlyFile(folder);
   std::vector<char> good(std::filesystem::file_size(path));
   std::ifstream(path, std::ios::binary).read(good.data(), static_cast<std::streamsize>(good.size()));
   std::mt19937 random(3);
@@ -508,9 +496,9 @@ TEST_CASE("damaged files of compiled shaders are ignored") {
 }
 
 TEST_CASE("processes that write compiled shaders at once leave one's whole") {
-  const Folder folder;
+  const test::TemporaryFolder folder;
   const PipelineCacheKey key{1, 2, 3, {4}, {5}};
-  const PipelineCacheFile file((folder.path / "deep" / "er").string(), key);
+  const PipelineCacheFile file((folder.path() / "deep" / "er").string(), key);
   file.write(cacheData(key, 100));
   std::vector<std::thread> writers;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -522,6 +510,6 @@ TEST_CASE("processes that write compiled shaders at once leave one's whole") {
   for (int round = 0; round < 100; ++round) torn += file.read().empty() ? 1 : 0;
   for (std::thread& writer : writers) writer.join();
   CHECK(torn == 0);
-  CHECK(std::filesystem::directory_entry(folder.onlyFile()).is_regular_file());
-  CHECK(std::distance(std::filesystem::directory_iterator(folder.path / "deep" / "er"), {}) == 1);
+  CHECK(std::filesystem::directory_entry(onlyFile(folder)).is_regular_file());
+  CHECK(std::distance(std::filesystem::directory_iterator(folder.path() / "deep" / "er"), {}) == 1);
 }

@@ -1,12 +1,11 @@
 // The index of a Cinema database: its text, and the existing indices that it continues or refuses.
-#include <unistd.h>
-
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string>
 
 #include "tests/Catch.h"
+#include "tests/TemporaryFolder.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/Cinema.h"
 
@@ -17,18 +16,14 @@ namespace {
 class Database {
  public:
   Database() { std::filesystem::create_directories(folder); }
-  ~Database() { std::filesystem::remove_all(folder); }
-  Database(const Database&) = delete;
-  Database& operator=(const Database&) = delete;
-
   std::string text() const {
     std::ifstream file(folder / "data.csv");
     return {std::istreambuf_iterator<char>(file), {}};
   }
   void write(const std::string& text) const { std::ofstream(folder / "data.csv") << text; }
 
-  const std::filesystem::path folder =
-      std::filesystem::temp_directory_path() / ("vdi_cinema_" + std::to_string(::getpid()) + ".cdb");
+  const test::TemporaryFolder parent;
+  const std::filesystem::path folder = parent.path() / "a.cdb";
 };
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "tests/Catch.h"
+#include "tests/TemporaryFolder.h"
 #include "tests/io/Samples.h"
 #include "vdi/io/Files.h"
 

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "tests/Catch.h"
+#include "tests/TemporaryFolder.h"
 #include "tests/io/Samples.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/Png.h"

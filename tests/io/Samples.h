@@ -1,14 +1,12 @@
-// VDIs, folders and errors that the tests of io share.
+// VDIs and errors that the tests of io share.
 #pragma once
 
-#include <stdlib.h>
 #include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <string>
 
@@ -138,26 +136,6 @@ inline Vdi compact(const Vdi& vdi) {
   result.lists = reference::compacted(full(vdi), result.depthCode);
   return result;
 }
-
-/// A folder that is removed with everything in it.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "vdi-test-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
-    path_ = name;
-  }
-  ~TemporaryFolder() { std::filesystem::remove_all(path_); }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-  std::size_t fileCount() const {
-    return static_cast<std::size_t>(std::distance(std::filesystem::directory_iterator(path_), {}));
-  }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// As long as it lives, files of this process cannot grow beyond `bytes`.
 class FileSizeLimit {

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "tests/Catch.h"
+#include "tests/TemporaryFolder.h"
 #include "tests/io/Samples.h"
 #include "vdi/core/Thinning.h"
 #include "vdi/io/Files.h"

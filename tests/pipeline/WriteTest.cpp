@@ -9,6 +9,7 @@
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
 #include "tests/comm/SharedFolder.h"
+#include "tests/io/Samples.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/VdiFile.h"

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "tests/Catch.h"
+#include "tests/TemporaryFolder.h"
 #include "tests/io/Samples.h"
 #include "vdi/core/Error.h"
 #include "vdi/runlog/RunLog.h"

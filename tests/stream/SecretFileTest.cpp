@@ -7,7 +7,7 @@
 #include <string>
 
 #include "tests/Catch.h"
-#include "tests/io/Samples.h"
+#include "tests/TemporaryFolder.h"
 #include "vdi/stream/SecretFile.h"
 
 using namespace vdi;

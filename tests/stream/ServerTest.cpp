@@ -11,6 +11,7 @@
 
 #include "tests/Catch.h"
 #include "tests/FuzzTime.h"
+#include "tests/TemporaryFolder.h"
 #include "tests/io/Samples.h"
 #include "vdi/core/Thinning.h"
 #include "vdi/io/VdiFile.h"
