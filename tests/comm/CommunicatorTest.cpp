@@ -15,11 +15,14 @@
 #include <vector>
 
 #include "tests/Catch.h"
+#include "tests/Thrown.h"
 #include "vdi/comm/Communicator.h"
 #include "vdi/core/Error.h"
 
 using namespace vdi;
 using comm::Communicator;
+using test::Thrown;
+using test::thrownBy;
 
 namespace {
 
@@ -46,23 +49,6 @@ std::vector<T> valuesOf(std::span<const std::byte> bytes) {
   std::vector<T> values(bytes.size() / sizeof(T));
   if (!values.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
   return values;
-}
-
-/// The exception of `call`; code Cancelled and an empty text if it throws none.
-struct Thrown {
-  ErrorCode code = ErrorCode::Cancelled;
-  std::string text;
-};
-
-Thrown thrownBy(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return {error.code(), error.what()};
-  } catch (const std::exception& error) {
-    return {ErrorCode::Io, error.what()};
-  }
-  return {};
 }
 
 /// Address space without memory: a span of any length that a test needs, but must not touch.

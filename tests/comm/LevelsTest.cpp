@@ -8,6 +8,7 @@
 #include <span>
 
 #include "tests/Catch.h"
+#include "tests/Thrown.h"
 #include "vdi/comm/GhostExchange.h"
 #include "vdi/core/Error.h"
 #include "vdi/reference/Reference.h"
@@ -118,16 +119,6 @@ std::vector<Block> cubes(Kind kind, const std::vector<int>& cells) {
 }
 
 constexpr double rounding = 1e-9;  // of values of some 100
-
-ErrorCode codeOf(const std::function<void()>& call, std::string& text) {
-  try {
-    call();
-  } catch (const Error& error) {
-    text = error.what();
-    return error.code();
-  }
-  return ErrorCode::Io;
-}
 
 }  // namespace
 
@@ -312,9 +303,8 @@ TEST_CASE("blocks of one level that overlap are refused on all ranks, with both 
     const glm::dvec3 lo(1.0 - depth, 0.5, 0.5);
     mine.push_back(blockIn(Kind::Cells, {lo, lo + 1.0}, glm::ivec3(10)));
   }
-  std::string text;
-  const ErrorCode code =
-      codeOf([&] { fill ? comm::exchangeGhosts(world, mine) : comm::settleOwnership(world, mine); }, text);
+  const auto [code, text] = vdi::test::thrownBy(
+      [&] { fill ? comm::exchangeGhosts(world, mine) : comm::settleOwnership(world, mine); });
   CHECK(code == ErrorCode::InvalidArgument);
   CHECK_THAT(text, vdi::test::ContainsSubstring("block 1 of rank 0 (from (0, 0, 0) to (1, 1, 1))"));
   const std::string second =

@@ -13,6 +13,7 @@
 
 #include "tests/Catch.h"
 #include "tests/TemporaryFolder.h"
+#include "tests/Thrown.h"
 #include "tests/io/Samples.h"
 #include "vdi/io/Files.h"
 

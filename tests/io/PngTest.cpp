@@ -6,6 +6,7 @@
 
 #include "tests/Catch.h"
 #include "tests/TemporaryFolder.h"
+#include "tests/Thrown.h"
 #include "tests/io/Samples.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/Png.h"

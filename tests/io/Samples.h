@@ -1,4 +1,4 @@
-// VDIs and errors that the tests of io share.
+// VDIs and limits that the tests of io share.
 #pragma once
 
 #include <sys/resource.h>
@@ -7,11 +7,8 @@
 #include <cmath>
 #include <csignal>
 #include <cstdint>
-#include <functional>
 #include <string>
 
-#include "tests/Catch.h"
-#include "vdi/core/Error.h"
 #include "vdi/core/Vdi.h"
 #include "vdi/reference/Compaction.h"
 
@@ -156,16 +153,5 @@ class FileSizeLimit {
   rlimit before_{};
   void (*handler_)(int);
 };
-
-/// The error that `call` throws; fails the test if it throws none, or another exception.
-inline Error errorOf(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error;
-  }
-  FAIL("nothing was thrown");
-  return {ErrorCode::Io, ""};
-}
 
 }  // namespace vdi::test

@@ -12,6 +12,7 @@
 #include "tests/Catch.h"
 #include "tests/FuzzTime.h"
 #include "tests/io/Samples.h"
+#include "vdi/core/Error.h"
 #include "vdi/io/ListCodec.h"
 #include "vdi/io/VdiFile.h"
 

@@ -7,6 +7,7 @@
 
 #include "tests/Catch.h"
 #include "tests/TemporaryFolder.h"
+#include "tests/Thrown.h"
 #include "tests/io/Samples.h"
 #include "vdi/core/Thinning.h"
 #include "vdi/io/Files.h"

@@ -8,7 +8,9 @@
 #include <thread>
 
 #include "tests/Catch.h"
+#include "tests/Devices.h"
 #include "tests/Scenes.h"
+#include "tests/Thrown.h"
 #include "tests/pipeline/PictureDifference.h"
 #include "vdi/comm/Funnel.h"
 #include "vdi/core/Error.h"
@@ -19,29 +21,15 @@
 using namespace vdi;
 using synthetic::Joint;
 using synthetic::Layout;
+using test::device;
+using test::thrownBy;
 
 namespace {
-
-std::shared_ptr<gpu::Device> device() {
-  static const std::shared_ptr<gpu::Device> instance = gpu::Device::create(gpu::requestFromEnvironment(0));
-  return instance;
-}
 
 bool anythingSeen(const Image& image) {
   std::size_t seen = 0;
   for (const glm::vec4& pixel : image.rgba) seen += pixel.a > 0.1F ? 1 : 0;
   return seen > image.rgba.size() / 20;
-}
-
-/// The error that the call throws; Io if it throws none.
-template <typename Call>
-ErrorCode codeOf(Call call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.code();
-  }
-  return ErrorCode::Io;
 }
 
 struct Case {
@@ -511,11 +499,11 @@ TEST_CASE("frames that are never finished, and frames under way when a rank fail
   const auto vdi = generator.finish(std::move(kept));
   if (vdi) CHECK(*vdi == *expected);
   VdiFrame lost = generator.start(test::oblique(), function, settings);
-  CHECK(codeOf([&] {
+  CHECK(thrownBy([&] {
           generator.start(test::oblique(), function, settings,
                           [&](double) { return world.rank() != world.size() - 1; });
-        }) == ErrorCode::Cancelled);
-  CHECK(codeOf([&] { generator.finish(std::move(lost)); }) == ErrorCode::Cancelled);
+        }).code == ErrorCode::Cancelled);
+  CHECK(thrownBy([&] { generator.finish(std::move(lost)); }).code == ErrorCode::Cancelled);
   const auto after = generator.generate(test::oblique(), function, settings);
   if (after) CHECK(*after == *expected);
   // A handle may outlive its generator.
@@ -543,8 +531,9 @@ TEST_CASE("a frame cancelled late leaves nothing in the next one's memory") {
     generator.setBlocks(decomposed.mine);
     const auto late = [&](double done) { return done < 0.6 || world.rank() != 1; };
     if (stopped && world.size() > 1) {
-      CHECK(codeOf([&] { generator.generate(beside, function, settings, late); }) == ErrorCode::Cancelled);
-      CHECK(codeOf([&] { generator.renderVolume(beside, function, settings, late); }) ==
+      CHECK(thrownBy([&] { generator.generate(beside, function, settings, late); }).code ==
+            ErrorCode::Cancelled);
+      CHECK(thrownBy([&] { generator.renderVolume(beside, function, settings, late); }).code ==
             ErrorCode::Cancelled);
     }
     const auto vdi = generator.generate(test::oblique(), function, settings);
@@ -563,19 +552,20 @@ TEST_CASE("a frame of threads that may not call MPI: the same, also after one th
   for (const bool stopped : {false, true, false}) {
     comm::Funnel funnel;
     std::atomic<bool> done{false};
-    ErrorCode code = ErrorCode::Io;
+    std::optional<ErrorCode> code;
     std::optional<Vdi> vdi;
     std::jthread thread([&] {
       const comm::Funnel::Entry entry(funnel);
-      code = codeOf([&] {
+      const auto generate = [&] {
         vdi = generator.generate(test::oblique(), function, settings,
                                  [&](double share) { return !stopped || share < 0.5 || world.rank() != 0; });
-      });
+      };
+      code = thrownBy(generate).code;
       done = true;
     });
     while (!done) funnel.serve(std::chrono::milliseconds(5));
     thread.join();
-    CHECK(code == (stopped ? ErrorCode::Cancelled : ErrorCode::Io));
+    CHECK(code == (stopped ? std::optional(ErrorCode::Cancelled) : std::nullopt));
     CHECK(vdi.has_value() == (!stopped && world.rank() == 0));
     if (vdi) CHECK(*vdi == *expected);
   }
@@ -635,9 +625,9 @@ TEST_CASE("parameters that differ between ranks are refused on every rank, by na
   CHECK_THROWS_WITH(generator.generate(test::oblique(), test::threeHues(1.0), other),
                     ContainsSubstring("different values: width, fill"));
   // If one rank is told to stop, all stop.
-  CHECK(codeOf([&] {
+  CHECK(thrownBy([&] {
           generator.generate(test::oblique(), test::threeHues(1.0), settings,
                              [&](double) { return world.rank() != 1; });
-        }) == ErrorCode::Cancelled);
+        }).code == ErrorCode::Cancelled);
   CHECK_NOTHROW(generator.generate(test::oblique(), test::threeHues(1.0), settings));
 }

@@ -5,6 +5,7 @@
 #include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
+#include "tests/Thrown.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
 #include "vdi/pipeline/VdiGenerator.h"
@@ -33,14 +34,9 @@ float highestOpacity(const Image& image) {
 }
 
 ErrorCode codeOf(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    CHECK(std::string(error.what()).size() > 10);
-    return error.code();
-  }
-  FAIL("nothing was thrown");
-  return ErrorCode::Io;
+  const Error error = test::errorOf(call);
+  CHECK(std::string(error.what()).size() > 10);
+  return error.code();
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "tests/Catch.h"
+#include "tests/Thrown.h"
 #include "tests/comm/SharedFolder.h"
 #include "tests/io/Samples.h"
 #include "vdi/io/Files.h"

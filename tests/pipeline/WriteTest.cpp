@@ -8,6 +8,7 @@
 #include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
+#include "tests/Thrown.h"
 #include "tests/comm/SharedFolder.h"
 #include "tests/io/Samples.h"
 #include "vdi/core/Error.h"

@@ -24,6 +24,7 @@
 #include "tests/Catch.h"
 #include "tests/FuzzTime.h"
 #include "tests/io/Samples.h"
+#include "vdi/core/Error.h"
 #include "vdi/io/VdiFile.h"
 #include "vdi/stream/Assembly.h"
 #include "vdi/stream/Client.h"

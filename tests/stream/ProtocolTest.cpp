@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "tests/Catch.h"
+#include "tests/Thrown.h"
 #include "tests/io/Samples.h"
 #include "vdi/core/Error.h"
 #include "vdi/stream/Assembly.h"

@@ -12,6 +12,7 @@
 #include "tests/Catch.h"
 #include "tests/FuzzTime.h"
 #include "tests/TemporaryFolder.h"
+#include "tests/Thrown.h"
 #include "tests/io/Samples.h"
 #include "vdi/core/Thinning.h"
 #include "vdi/io/VdiFile.h"
