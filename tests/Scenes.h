@@ -20,6 +20,11 @@ inline double topOf(ScalarType type) {
   return sizeOf(type) == 1 ? 100.0 : type == ScalarType::F32 ? 1.0 : 1000.0;
 }
 
+/// A linear field, from 0 to 1 in the unit cube.
+inline double slanted(const glm::dvec3& p) {
+  return 0.45 * p.x + 0.35 * p.y + 0.2 * p.z;
+}
+
 /// The blocks that `rank` of `ranks` holds of a field on a lattice whose longest side is 1.
 struct Decomposed {
   synthetic::Lattice lattice;

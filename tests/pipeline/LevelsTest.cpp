@@ -16,14 +16,11 @@ using namespace vdi;
 using test::device;
 using test::Difference;
 using test::differenceOf;
+using test::slanted;
 
 namespace {
 
 using Field = std::function<double(const glm::dvec3&)>;
-
-double linear(const glm::dvec3& p) {
-  return 0.45 * p.x + 0.35 * p.y + 0.2 * p.z;  // 0 .. 1 in the unit cube
-}
 
 double smooth(const glm::dvec3& p) {
   return 0.5 + 0.25 * std::sin(5.0 * p.x + 2.0 * p.y) + 0.25 * std::cos(4.0 * p.z - 3.0 * p.x);
@@ -136,12 +133,12 @@ std::optional<Image> truthOf(const Field& field) {
 
 TEST_CASE("three levels, side by side and over each other: the picture of a uniform lattice") {
   const comm::Communicator world = comm::Communicator::world();
-  const std::optional<Image> truth = truthOf(linear);
+  const std::optional<Image> truth = truthOf(slanted);
   VdiGenerator many(device(), comm::Communicator::world());
   for (const bool cells : {false, true}) {
     for (const int ratio : {0, 2, 4}) {
       INFO((cells ? "cells" : "points") << ", overlapping with ratio " << ratio);
-      const auto all = ratio == 0 ? sideBySide(cells, linear) : overEachOther(cells, linear, ratio);
+      const auto all = ratio == 0 ? sideBySide(cells, slanted) : overEachOther(cells, slanted, ratio);
       many.setBlocks(decomposed(all, world));
       const auto volume = many.renderVolume(test::oblique(), bands(), settings());
       const auto vdi = many.generate(test::oblique(), bands(), settings());
@@ -186,7 +183,7 @@ TEST_CASE("blocks of one level that overlap between ranks: refused on all, and t
   const comm::Communicator world = comm::Communicator::world();
   VdiGenerator many(device(), comm::Communicator::world());
   const bool fill = GENERATE(true, false);
-  const Block block = blockIn(false, {glm::dvec3(0.0), glm::dvec3(1.0)}, 1.0 / 12, linear);
+  const Block block = blockIn(false, {glm::dvec3(0.0), glm::dvec3(1.0)}, 1.0 / 12, slanted);
   Block shifted = block;
   shifted.origin.x += 0.5;
   shifted.owned.lo.x += 0.5;

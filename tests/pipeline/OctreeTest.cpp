@@ -16,6 +16,7 @@ using namespace vdi;
 using test::device;
 using test::Difference;
 using test::differenceOf;
+using test::slanted;
 
 namespace {
 
@@ -78,10 +79,6 @@ std::vector<Box> cellsOfFineOctant(int side) {
   for (int i = 0; i < side * side * side; ++i)
     add({i % side, i / side % side, i / (side * side)}, 0.5 / side);
   return cells;
-}
-
-double slanted(const glm::dvec3& p) {
-  return 0.45 * p.x + 0.35 * p.y + 0.2 * p.z;
 }
 
 double ball(const glm::dvec3& p) {

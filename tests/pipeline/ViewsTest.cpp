@@ -19,6 +19,17 @@ using test::deviceAsGpu;
 using test::isView;
 using test::rounding;
 
+namespace {
+
+/// A sparse VDI: most of its tiles are empty.
+Vdi coilFrom(const Camera& camera) {
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks(test::onOneRank("coil", {40, 40, 40}, {1, 1, 1}, ScalarType::U8).mine);
+  return *generator.generate(camera, test::threeHues(80.0), test::smallSettings(121, 83, 6));
+}
+
+}  // namespace
+
 TEST_CASE("rays leave a picture within a tile of lists, through material at its edge") {
   const auto decomposed = test::onOneRank("interface", {24, 24, 24});
   VdiGenerator generator(device(), comm::Communicator::serial());
@@ -75,16 +86,13 @@ TEST_CASE("bytes of a view are those of its floats, whichever was asked for befo
 }
 
 TEST_CASE("views of a sparse VDI, most of whose tiles are skipped: as in the reference") {
-  const auto decomposed = test::onOneRank("coil", {40, 40, 40}, {1, 1, 1}, ScalarType::U8);
   const bool parallel = GENERATE(false, true);
   const Camera camera = test::oblique(parallel);
-  VdiGenerator generator(device(), comm::Communicator::serial());
-  generator.setBlocks(decomposed.mine);
-  const auto vdi = generator.generate(camera, test::threeHues(80.0), test::smallSettings(121, 83, 6));
+  const Vdi vdi = coilFrom(camera);
   VdiRenderer renderer(device());
-  renderer.setVdi(*vdi);
+  renderer.setVdi(vdi);
   VdiRenderer rendererAsGpu(deviceAsGpu());
-  rendererAsGpu.setVdi(*vdi);
+  rendererAsGpu.setVdi(vdi);
   std::vector<Camera> cameras;
   for (const double angle : {2.0, 20.0, 70.0, 160.0, 290.0}) {
     cameras.push_back(camera.azimuth(angle));
@@ -110,7 +118,7 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are skipped: as in the ref
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     for (const Reconstruction reconstruction : test::reconstructions) {
       INFO("camera " << i << ", " << toString(reconstruction) << ", parallel " << parallel);
-      const Image expected = reference::render(*vdi, View(cameras[i], 65, 47), reconstruction);
+      const Image expected = reference::render(vdi, View(cameras[i], 65, 47), reconstruction);
       seenFrom += std::any_of(expected.rgba.begin(), expected.rgba.end(),
                               [](const glm::vec4& c) { return c.a > 0.1F; })
                       ? 1
@@ -127,16 +135,13 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are skipped: as in the ref
 }
 
 TEST_CASE("rays that end at objects, of any part of an image plane: as in the reference") {
-  const auto decomposed = test::onOneRank("coil", {40, 40, 40}, {1, 1, 1}, ScalarType::U8);
   const bool parallel = GENERATE(false, true);
   const Camera camera = test::oblique(parallel);
-  VdiGenerator generator(device(), comm::Communicator::serial());
-  generator.setBlocks(decomposed.mine);
-  const auto vdi = generator.generate(camera, test::threeHues(80.0), test::smallSettings(121, 83, 6));
+  const Vdi vdi = coilFrom(camera);
   VdiRenderer renderer(device());
-  renderer.setVdi(*vdi);
+  renderer.setVdi(vdi);
   VdiRenderer rendererAsGpu(deviceAsGpu());
-  rendererAsGpu.setVdi(*vdi);
+  rendererAsGpu.setVdi(vdi);
   constexpr int width = 65;
   constexpr int height = 47;
   for (const double angle : {0.0, 20.0, 160.0}) {
@@ -149,8 +154,8 @@ TEST_CASE("rays that end at objects, of any part of an image plane: as in the re
     for (const View& view : {whole, part}) {
       // A slanted wall through the middle of the scene; to its left rays go on, to its right they end at
       // once.
-      const double middle = view.depthOf(vdi->bounds.center());
-      const double depth = glm::length(vdi->bounds.size());
+      const double middle = view.depthOf(vdi.bounds.center());
+      const double depth = glm::length(vdi.bounds.size());
       std::vector<float> ends;
       for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
@@ -162,8 +167,8 @@ TEST_CASE("rays that end at objects, of any part of an image plane: as in the re
       }
       for (const Reconstruction reconstruction : test::reconstructions) {
         INFO("from " << angle << ", " << toString(reconstruction) << ", parallel " << parallel);
-        const Image open = reference::render(*vdi, view, reconstruction);
-        const Image expected = reference::render(*vdi, view, reconstruction, ends);
+        const Image open = reference::render(vdi, view, reconstruction);
+        const Image expected = reference::render(vdi, view, reconstruction, ends);
         std::size_t hidden = 0;
         std::size_t dimmed = 0;
         for (std::size_t i = 0; i < ends.size(); ++i) {
