@@ -23,6 +23,7 @@
 #include <unistd.h>
 
 #include "catalyst_adaptor/vdi_catalyst.h"
+#include "tests/catalyst_adaptor/expect.h"
 
 static int size = 16;
 static double* now;
@@ -138,11 +139,9 @@ static long microseconds_since(double start) {
 }
 
 int main(int argc, char** argv) {
-  MPI_Init(&argc, &argv);
   int rank = 0;
-  int ranks = 1;
-  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  int ranks = 0;
+  begin(&argc, &argv, &rank, &ranks);
   if (argc != 3) MPI_Abort(MPI_COMM_WORLD, 2);
   size = number_of("VDI_TEST_SIZE", size);
   const int steps = atoi(argv[2]);
@@ -166,16 +165,11 @@ int main(int argc, char** argv) {
   }
 
   vdi_catalyst* catalyst = NULL;
-  const int32_t comm = MPI_Comm_c2f(MPI_COMM_WORLD);
-  const size_t length = strlen(argv[1]);
-  const char* scripts[] = {argv[1]};
   const int has_library = strcmp(argv[1], "-") != 0;
   int wrong = 0;
   if (has_library) {
     const double start = MPI_Wtime();
-    const int code = length > 3 && strcmp(argv[1] + length - 3, ".py") == 0
-                         ? vdi_catalyst_initialize(comm, 1, scripts, &catalyst)
-                         : vdi_catalyst_initialize_json(comm, argv[1], &catalyst);
+    const int code = initialize_any(argv[1], &catalyst);
     const long spent = microseconds_since(start);
     if (rank == 0) printf("initialize %d %ld\n", code, spent);
     wrong += differs(code);
@@ -227,6 +221,5 @@ int main(int argc, char** argv) {
   }
   free(now);
   free(next);
-  MPI_Finalize();
-  return wrong == 0 ? 0 : 1;
+  return end(wrong);
 }

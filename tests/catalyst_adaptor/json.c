@@ -83,15 +83,11 @@ static int refuse_bad(int rank) {
 }
 
 int main(int argc, char** argv) {
-  MPI_Init(&argc, &argv);
   int rank = 0;
   int ranks = 0;
-  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  begin(&argc, &argv, &rank, &ranks);
   if (argc < 2) MPI_Abort(MPI_COMM_WORLD, 2);
   is_late = getenv("VDI_ISOLATION") != NULL;
-  const char* folder = getenv("VDI_OUTPUT");
-  if (folder != NULL && chdir(folder) != 0) MPI_Abort(MPI_COMM_WORLD, 3);
   int wrong = getenv("VDI_TEST_BAD") != NULL ? refuse_bad(rank) : 0;
 
   const char* full = getenv("VDI_TEST_FULL");
@@ -103,20 +99,12 @@ int main(int argc, char** argv) {
   const char* refused = getenv("VDI_TEST_REFUSED");
   if (refused != NULL) {
     wrong += refuse(rank, argv[1], atoi(refused));
-    MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
-    MPI_Finalize();
-    return wrong == 0 ? 0 : 1;
+    return end(wrong);
   }
 
-  const int32_t comm = MPI_Comm_c2f(MPI_COMM_WORLD);
-  const size_t length = strlen(argv[1]);
-  const int is_script = length > 3 && strcmp(argv[1] + length - 3, ".py") == 0;
-  const char* scripts[] = {argv[1]};
   vdi_catalyst* catalyst = NULL;
-  wrong += expect(rank, "initialize", VDI_CATALYST_OK,
-                  is_script ? vdi_catalyst_initialize(comm, 1, scripts, &catalyst)
-                            : vdi_catalyst_initialize_json(comm, argv[1], &catalyst));
-  if (!is_script) wrong += refuse(rank, argv[1], VDI_CATALYST_ENGINE); /* one at a time */
+  wrong += expect(rank, "initialize", VDI_CATALYST_OK, initialize_any(argv[1], &catalyst));
+  if (!is_script(argv[1])) wrong += refuse(rank, argv[1], VDI_CATALYST_ENGINE); /* one at a time */
 
   const int first = rank * N / ranks;
   const int count = (rank + 1) * N / ranks - first;
@@ -175,7 +163,5 @@ int main(int argc, char** argv) {
   wrong += expect_end(rank, vdi_catalyst_finalize(catalyst));
   wrong += expect(rank, "a second finalize", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_finalize(catalyst));
   wrong += expect(rank, "a step is wanted after it", 0, vdi_catalyst_wants(catalyst, 0, 0.0));
-  MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
-  MPI_Finalize();
-  return wrong == 0 ? 0 : 1;
+  return end(wrong);
 }

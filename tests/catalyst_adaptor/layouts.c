@@ -9,9 +9,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 #include "catalyst_adaptor/vdi_catalyst.h"
+#include "tests/catalyst_adaptor/expect.h"
 
 enum { PAD = 5, MOST = 16 };
 
@@ -93,14 +93,10 @@ static void store(const array* a, const int32_t* at, double value) {
 }
 
 int main(int argc, char** argv) {
-  MPI_Init(&argc, &argv);
-  if (argc != 5) MPI_Abort(MPI_COMM_WORLD, 2);
-  const char* folder = getenv("VDI_OUTPUT");
-  if (folder != NULL && chdir(folder) != 0) MPI_Abort(MPI_COMM_WORLD, 3);
   int rank = 0;
   int ranks = 0;
-  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  begin(&argc, &argv, &rank, &ranks);
+  if (argc != 5) MPI_Abort(MPI_COMM_WORLD, 2);
   const int n = atoi(argv[2]);
   int split[3] = {0, 0, 0};
   MPI_Dims_create(ranks, 3, split);
@@ -127,13 +123,8 @@ int main(int argc, char** argv) {
     if (rank % 2 == 1 && strcmp(arrays[i].name, "elsewhere") == 0) arrays[i].name = "another";
   }
 
-  const size_t length = strlen(argv[1]);
-  const int is_script = length > 3 && strcmp(argv[1] + length - 3, ".py") == 0;
-  const char* scripts[] = {argv[1]};
-  const int32_t comm = MPI_Comm_c2f(MPI_COMM_WORLD);
   vdi_catalyst* catalyst = NULL;
-  int wrong = (is_script ? vdi_catalyst_initialize(comm, 1, scripts, &catalyst)
-                         : vdi_catalyst_initialize_json(comm, argv[1], &catalyst)) != VDI_CATALYST_OK;
+  int wrong = initialize_any(argv[1], &catalyst) != VDI_CATALYST_OK;
   const double h = 1.0 / n;
   const vdi_catalyst_block block = {{cells[0], cells[1], cells[2]},
                                     {0, 0, 0},
@@ -178,8 +169,5 @@ int main(int argc, char** argv) {
   wrong += vdi_catalyst_finalize(catalyst) != VDI_CATALYST_OK;
   if (rank == 0) printf("%zu\n", (size_t)cells[0] * (size_t)cells[1] * (size_t)cells[2] * sizeof(float));
   free(pool);
-  MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
-  if (wrong != 0 && rank == 0) fprintf(stderr, "FAILED: %d calls\n", wrong);
-  MPI_Finalize();
-  return wrong == 0 ? 0 : 1;
+  return end(wrong);
 }

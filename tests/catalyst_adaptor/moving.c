@@ -1,5 +1,5 @@
 /* Blocks that come, go, move, and change size, spacing and rank at each step. Checks that the memory of the
- * process doesn't grow. Arguments: the number of frames, and the working folder, in which each frame's file
+ * process doesn't grow. Argument: the number of frames. In the folder VDI_OUTPUT each frame's file
  * replaces the last one. The blocks of a step are those of 20 steps before, so a fifth of the frames, in
  * which memory may grow, has the largest frame. VDI_ENDURANCE_FRAMES in the environment replaces the number.
  */
@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "catalyst_adaptor/vdi_catalyst.h"
+#include "tests/catalyst_adaptor/expect.h"
 
 enum { PERIOD = 20, SIDE = 4, COARSE = 6, FINE = 12, MAX_VALUES = FINE * FINE * FINE };
 
@@ -59,21 +60,11 @@ static int place_blocks(int step, int rank, int ranks, vdi_catalyst_block* block
   return count;
 }
 
-static long resident_kib(void) {
-  long pages = 0;
-  FILE* file = fopen("/proc/self/statm", "r");
-  if (file == NULL || fscanf(file, "%*d %ld", &pages) != 1) abort();
-  fclose(file);
-  return pages * (sysconf(_SC_PAGESIZE) / 1024);
-}
-
 int main(int argc, char** argv) {
-  MPI_Init(&argc, &argv);
   int rank = 0;
-  int ranks = 1;
-  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
-  if (argc < 3 || chdir(argv[2]) != 0) MPI_Abort(MPI_COMM_WORLD, 2);
+  int ranks = 0;
+  begin(&argc, &argv, &rank, &ranks);
+  if (argc < 2) MPI_Abort(MPI_COMM_WORLD, 2);
   const char* asked = getenv("VDI_ENDURANCE_FRAMES");
   const int frames = atoi(asked != NULL ? asked : argv[1]);
   vdi_catalyst* catalyst = NULL;
@@ -106,7 +97,5 @@ int main(int argc, char** argv) {
     fprintf(stderr, "rank %d: the memory has grown by %ld KiB\n", rank, late - early);
     ++wrong;
   }
-  MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
-  MPI_Finalize();
-  return wrong != 0;
+  return end(wrong);
 }

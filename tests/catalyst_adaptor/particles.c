@@ -6,12 +6,10 @@
  * lengths of two cells. */
 #include <math.h>
 #include <mpi.h>
-#include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 
 #include "catalyst_adaptor/vdi_catalyst.h"
+#include "tests/catalyst_adaptor/expect.h"
 
 enum { COUNT = 4000, FAULTS = 6, N = 8 };
 
@@ -53,12 +51,6 @@ static int simulate(int rank, int ranks, int step) {
   particles[count + 4].length = -1.0F;
   particles[count + 5].length = NAN;
   return count + FAULTS;
-}
-
-static int expect(int rank, const char* what, int wanted, int code) {
-  if (code == wanted) return 0;
-  fprintf(stderr, "rank %d: %s returned %d, not %d\n", rank, what, code, wanted);
-  return 1;
 }
 
 static vdi_catalyst_particles described(int count) {
@@ -124,23 +116,13 @@ static int refuse_bad(vdi_catalyst* catalyst, int rank, int ranks) {
 }
 
 int main(int argc, char** argv) {
-  MPI_Init(&argc, &argv);
   int rank = 0;
   int ranks = 0;
-  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
-  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
+  begin(&argc, &argv, &rank, &ranks);
   if (argc < 2) MPI_Abort(MPI_COMM_WORLD, 2);
-  const char* folder = getenv("VDI_OUTPUT");
-  if (folder != NULL && chdir(folder) != 0) MPI_Abort(MPI_COMM_WORLD, 3);
 
-  const int32_t comm = MPI_Comm_c2f(MPI_COMM_WORLD);
-  const size_t length = strlen(argv[1]);
-  const int is_script = length > 3 && strcmp(argv[1] + length - 3, ".py") == 0;
-  const char* scripts[] = {argv[1]};
   vdi_catalyst* catalyst = NULL;
-  int wrong = expect(rank, "initialize", VDI_CATALYST_OK,
-                     is_script ? vdi_catalyst_initialize(comm, 1, scripts, &catalyst)
-                               : vdi_catalyst_initialize_json(comm, argv[1], &catalyst));
+  int wrong = expect(rank, "initialize", VDI_CATALYST_OK, initialize_any(argv[1], &catalyst));
   const vdi_catalyst_particles before = described(1);
   wrong += refused(catalyst, rank, "particles before blocks", "V", &before);
 
@@ -174,7 +156,5 @@ int main(int argc, char** argv) {
   }
   wrong += expect(rank, "finalize", VDI_CATALYST_OK, vdi_catalyst_finalize(catalyst));
   wrong += refused(catalyst, rank, "particles after finalize", "V", &given);
-  MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
-  MPI_Finalize();
-  return wrong == 0 ? 0 : 1;
+  return end(wrong);
 }

@@ -44,15 +44,6 @@ static int wants_in_the_end(vdi_catalyst* catalyst, int step, int wanted) {
   return wants;
 }
 
-static long resident_kib(void) {
-  long pages = 0;
-  long resident = 0;
-  FILE* file = fopen("/proc/self/statm", "r");
-  if (file == NULL || fscanf(file, "%ld %ld", &pages, &resident) != 2) abort();
-  fclose(file);
-  return resident * (sysconf(_SC_PAGESIZE) / 1024);
-}
-
 /* Impossible blocks are an error, and the earlier blocks stay. */
 static int bad_blocks(int rank, vdi_catalyst* catalyst, vdi_catalyst_block good) {
   int wrong = 0;
@@ -87,16 +78,14 @@ static int bad_blocks(int rank, vdi_catalyst* catalyst, vdi_catalyst_block good)
 }
 
 /* Numbers that ParaView would truncate are refused, so that no file gets a wrong name. */
-static int bad_steps(int rank, vdi_catalyst* catalyst) {
+static int bad_steps(int rank, int ranks, vdi_catalyst* catalyst) {
   const int64_t steps[] = {3000000000, 4294967301, -1};
   int wrong = 0;
   for (int i = 0; i < 3; ++i) {
     wrong += expect(rank, "a step that is no int", VDI_CATALYST_BAD_ARGUMENT,
                     vdi_catalyst_execute(catalyst, steps[i], 0.0));
   }
-  int size = 0;
-  MPI_Comm_size(MPI_COMM_WORLD, &size);
-  if (size == 1) return wrong;
+  if (ranks == 1) return wrong;
   return wrong + expect(rank, "a step that the ranks don't share", VDI_CATALYST_BAD_ARGUMENT,
                         vdi_catalyst_execute(catalyst, rank == 0 ? 8 : 9, 0.0));
 }
@@ -131,9 +120,9 @@ static int run_steps(int rank, vdi_catalyst* catalyst, int argc, char** argv) {
 }
 
 int main(int argc, char** argv) {
-  MPI_Init(&argc, &argv);
   int rank = 0;
-  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  int ranks = 0;
+  begin(&argc, &argv, &rank, &ranks);
   int wrong = 0;
   if (argc < 3) MPI_Abort(MPI_COMM_WORLD, 2);
   is_late = getenv("VDI_ISOLATION") != NULL;
@@ -154,8 +143,7 @@ int main(int argc, char** argv) {
                       vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), 1, then, &catalyst));
       wrong += expect(rank, "finalize", VDI_CATALYST_OK, vdi_catalyst_finalize(catalyst));
     }
-    MPI_Finalize();
-    return wrong == 0 ? 0 : 1;
+    return end(wrong);
   }
   wrong += expect(rank, "initialize with a wrong handle", VDI_CATALYST_BAD_ARGUMENT,
                   vdi_catalyst_initialize(12345, 1, scripts, &catalyst));
@@ -176,7 +164,7 @@ int main(int argc, char** argv) {
                   vdi_catalyst_set_array(catalyst, "V", 99, VDI_CATALYST_POINTS, data));
   wrong += expect(rank, "set_array", VDI_CATALYST_OK,
                   vdi_catalyst_set_array(catalyst, "V", VDI_CATALYST_U8, VDI_CATALYST_POINTS, data));
-  wrong += bad_steps(rank, catalyst);
+  wrong += bad_steps(rank, ranks, catalyst);
   wrong += run_steps(rank, catalyst, argc, argv);
   if (getenv("VDI_TEST_LATE") != NULL) {
     MPI_Finalize();
@@ -193,7 +181,5 @@ int main(int argc, char** argv) {
   wrong += expect(rank, "the error's text after it", 0, vdi_catalyst_error(catalyst)[0] != '\0');
   wrong +=
       expect(rank, "execute without a handle", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_execute(NULL, 1, 0.0));
-  MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_SUM, MPI_COMM_WORLD);
-  MPI_Finalize();
-  return wrong == 0 ? 0 : 1;
+  return end(wrong);
 }

@@ -3,11 +3,9 @@
  * the array "in order" was used in place, so that the script's writes reached it. */
 #include <limits.h>
 #include <mpi.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "catalyst_adaptor/vdi_catalyst.h"
+#include "tests/catalyst_adaptor/expect.h"
 
 enum { NX = 20, NY = 17, NZ = 18, HALO = 2, PAD = 3, SIZE = sizeof(double) };
 
@@ -25,15 +23,14 @@ static struct __attribute__((packed)) {
 } packed[NZ][NY][NX];
 static int64_t integers[NX][NY][NZ];
 
+static int rank = 0;
 static int wrong = 0;
 
-static void expect(const char* what, int wanted, int code) {
-  if (code == wanted) return;
-  fprintf(stderr, "FAILED: %s returned %d, not %d\n", what, code, wanted);
-  ++wrong;
+static void check(const char* what, int wanted, int code) {
+  wrong += expect(rank, what, wanted, code);
 }
 
-static void simulate(int rank, int step) {
+static void simulate(int step) {
   for (size_t i = 0; i < sizeof with_halo / SIZE; ++i) (&with_halo[0][0][0])[i] = 1e30; /* never to be read */
   for (int z = 0; z < NZ; ++z) {
     for (int y = 0; y < NY; ++y) {
@@ -58,78 +55,76 @@ static int set(vdi_catalyst* catalyst, const char* name, int type, int component
                                         &strides);
 }
 
-static void set_arrays(vdi_catalyst* catalyst, int rank) {
+static void set_arrays(vdi_catalyst* catalyst) {
   const int f64 = VDI_CATALYST_F64;
   const void* data[] = {plain};
-  expect("plain", 0, vdi_catalyst_set_array(catalyst, "plain", f64, VDI_CATALYST_CELLS, data));
-  expect("in order", 0, set(catalyst, "in order", f64, 1, in_order, SIZE, NX * SIZE, NX * NY * SIZE, 0));
-  expect("planes", 0,
-         set(catalyst, "vectors", f64, 3, planes, SIZE, NX * SIZE, NX * NY * SIZE, NX * NY * NZ * SIZE));
-  expect("interleaved", 0,
-         set(catalyst, "interleaved", f64, 1, &interleaved[0][0][0][1], 2 * SIZE, 2 * NX * SIZE,
-             2 * NX * NY * SIZE, 0));
-  expect("padded", 0,
-         set(catalyst, "padded", f64, 1, padded, SIZE, (NX + PAD) * SIZE, (NX + PAD) * NY * SIZE, 0));
-  expect("z fastest", 0, set(catalyst, "z fastest", f64, 1, z_fastest, NY * NZ * SIZE, NZ * SIZE, SIZE, 0));
-  expect("untouched", 0, set(catalyst, "untouched", f64, 1, z_fastest, NY * NZ * SIZE, NZ * SIZE, SIZE, 0));
-  expect("partial", 0,
-         set(catalyst, "partial", f64, 1, rank == 1 ? NULL : z_fastest, NY * NZ * SIZE, NZ * SIZE, SIZE, 0));
-  expect("shifted", 0, set(catalyst, "shifted", f64, 1, z_fastest, NY * NZ * SIZE, NZ * SIZE, SIZE, 0));
+  check("plain", 0, vdi_catalyst_set_array(catalyst, "plain", f64, VDI_CATALYST_CELLS, data));
+  check("in order", 0, set(catalyst, "in order", f64, 1, in_order, SIZE, NX * SIZE, NX * NY * SIZE, 0));
+  check("planes", 0,
+        set(catalyst, "vectors", f64, 3, planes, SIZE, NX * SIZE, NX * NY * SIZE, NX * NY * NZ * SIZE));
+  check("interleaved", 0,
+        set(catalyst, "interleaved", f64, 1, &interleaved[0][0][0][1], 2 * SIZE, 2 * NX * SIZE,
+            2 * NX * NY * SIZE, 0));
+  check("padded", 0,
+        set(catalyst, "padded", f64, 1, padded, SIZE, (NX + PAD) * SIZE, (NX + PAD) * NY * SIZE, 0));
+  check("z fastest", 0, set(catalyst, "z fastest", f64, 1, z_fastest, NY * NZ * SIZE, NZ * SIZE, SIZE, 0));
+  check("untouched", 0, set(catalyst, "untouched", f64, 1, z_fastest, NY * NZ * SIZE, NZ * SIZE, SIZE, 0));
+  check("partial", 0,
+        set(catalyst, "partial", f64, 1, rank == 1 ? NULL : z_fastest, NY * NZ * SIZE, NZ * SIZE, SIZE, 0));
+  check("shifted", 0, set(catalyst, "shifted", f64, 1, z_fastest, NY * NZ * SIZE, NZ * SIZE, SIZE, 0));
   const double offset[] = {-0.5, 0.0, 0.0};
-  expect("offset", 0, vdi_catalyst_set_array_offset(catalyst, "shifted", VDI_CATALYST_CELLS, offset));
-  expect("with halo", 0,
-         set(catalyst, "with halo", f64, 1, &with_halo[HALO][HALO][HALO], SIZE, (NX + 2 * HALO) * SIZE,
-             (int64_t)(NX + 2 * HALO) * (NY + 2 * HALO) * SIZE, 0));
-  expect("backwards", 0,
-         set(catalyst, "backwards", f64, 1, &backwards[NZ - 1][NY - 1][NX - 1], -SIZE, -NX * SIZE,
-             -NX * NY * SIZE, 0));
+  check("offset", 0, vdi_catalyst_set_array_offset(catalyst, "shifted", VDI_CATALYST_CELLS, offset));
+  check("with halo", 0,
+        set(catalyst, "with halo", f64, 1, &with_halo[HALO][HALO][HALO], SIZE, (NX + 2 * HALO) * SIZE,
+            (int64_t)(NX + 2 * HALO) * (NY + 2 * HALO) * SIZE, 0));
+  check("backwards", 0,
+        set(catalyst, "backwards", f64, 1, &backwards[NZ - 1][NY - 1][NX - 1], -SIZE, -NX * SIZE,
+            -NX * NY * SIZE, 0));
   const int64_t unit = (int64_t)sizeof packed[0][0][0];
-  expect("packed", 0,
-         set(catalyst, "packed", f64, 1, &packed[0][0][0].value, unit, NX * unit, NX * NY * unit, 0));
-  expect("integers", 0,
-         set(catalyst, "integers", VDI_CATALYST_I64, 1, integers, NY * NZ * SIZE, NZ * SIZE, SIZE, 0));
-  expect("one value for all", 0, set(catalyst, "one", f64, 1, plain, 0, 0, 0, 0));
+  check("packed", 0,
+        set(catalyst, "packed", f64, 1, &packed[0][0][0].value, unit, NX * unit, NX * NY * unit, 0));
+  check("integers", 0,
+        set(catalyst, "integers", VDI_CATALYST_I64, 1, integers, NY * NZ * SIZE, NZ * SIZE, SIZE, 0));
+  check("one value for all", 0, set(catalyst, "one", f64, 1, plain, 0, 0, 0, 0));
 }
 
 static void set_bad_arrays(vdi_catalyst* catalyst) {
   const int bad = VDI_CATALYST_BAD_ARGUMENT;
   const int f64 = VDI_CATALYST_F64;
-  expect("strides that overflow", bad, set(catalyst, "plain", f64, 1, plain, INT64_MAX, SIZE, SIZE, 0));
-  expect("strides whose sum overflows", bad,
-         set(catalyst, "plain", f64, 1, plain, INT64_MAX / NX, INT64_MAX / NY, SIZE, 0));
-  expect("strides to below 0", bad, set(catalyst, "plain", f64, 1, plain, INT64_MIN / NX, SIZE, SIZE, 0));
-  expect("the least stride", bad, set(catalyst, "plain", f64, 1, plain, INT64_MIN, SIZE, SIZE, 0));
-  expect("components that overflow", bad, set(catalyst, "plain", f64, 3, plain, SIZE, SIZE, SIZE, INT64_MAX));
-  expect("no components", bad, set(catalyst, "plain", f64, 0, plain, SIZE, SIZE, SIZE, 0));
-  expect("too many components", bad, set(catalyst, "plain", f64, 17, plain, SIZE, SIZE, SIZE, 0));
+  check("strides that overflow", bad, set(catalyst, "plain", f64, 1, plain, INT64_MAX, SIZE, SIZE, 0));
+  check("strides whose sum overflows", bad,
+        set(catalyst, "plain", f64, 1, plain, INT64_MAX / NX, INT64_MAX / NY, SIZE, 0));
+  check("strides to below 0", bad, set(catalyst, "plain", f64, 1, plain, INT64_MIN / NX, SIZE, SIZE, 0));
+  check("the least stride", bad, set(catalyst, "plain", f64, 1, plain, INT64_MIN, SIZE, SIZE, 0));
+  check("components that overflow", bad, set(catalyst, "plain", f64, 3, plain, SIZE, SIZE, SIZE, INT64_MAX));
+  check("no components", bad, set(catalyst, "plain", f64, 0, plain, SIZE, SIZE, SIZE, 0));
+  check("too many components", bad, set(catalyst, "plain", f64, 17, plain, SIZE, SIZE, SIZE, 0));
   const void* data[] = {plain};
-  expect("no strides", bad,
-         vdi_catalyst_set_array_strided(catalyst, "plain", f64, VDI_CATALYST_CELLS, 1, data, NULL));
+  check("no strides", bad,
+        vdi_catalyst_set_array_strided(catalyst, "plain", f64, VDI_CATALYST_CELLS, 1, data, NULL));
 }
 
 int main(int argc, char** argv) {
-  MPI_Init(&argc, &argv);
-  int rank = 0;
-  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  int ranks = 0;
+  begin(&argc, &argv, &rank, &ranks);
   const char* const arguments[] = {"--compare", "plain"};
   vdi_catalyst_pipeline script = {NULL, 2, arguments};
   vdi_catalyst* catalyst = NULL;
   const int32_t comm = MPI_Comm_c2f(MPI_COMM_WORLD);
-  expect("no script", VDI_CATALYST_BAD_ARGUMENT,
-         vdi_catalyst_initialize_pipelines(comm, 1, &script, &catalyst));
+  check("no script", VDI_CATALYST_BAD_ARGUMENT,
+        vdi_catalyst_initialize_pipelines(comm, 1, &script, &catalyst));
   script.file = argc > 1 ? argv[1] : "";
-  expect("initialize", 0, vdi_catalyst_initialize_pipelines(comm, 1, &script, &catalyst));
+  check("initialize", 0, vdi_catalyst_initialize_pipelines(comm, 1, &script, &catalyst));
   const vdi_catalyst_block block = {
       {NX, NY, NZ}, {0, 0, 0}, {0, 0, 0}, {(double)rank * NX, 0.0, 0.0}, {1.0, 1.0, 1.0}};
-  expect("set_blocks", 0, vdi_catalyst_set_blocks(catalyst, 1, &block));
-  set_arrays(catalyst, rank);
+  check("set_blocks", 0, vdi_catalyst_set_blocks(catalyst, 1, &block));
+  set_arrays(catalyst);
   set_bad_arrays(catalyst);
   for (int step = 1; step <= 2; ++step) {
-    simulate(rank, step);
-    expect("execute", 0, vdi_catalyst_execute(catalyst, step, 0.5 * step));
-    expect("where the script wrote", 1, in_order[1][2][3] == -step);
+    simulate(step);
+    check("execute", 0, vdi_catalyst_execute(catalyst, step, 0.5 * step));
+    check("where the script wrote", 1, in_order[1][2][3] == -step);
   }
-  expect("finalize", 0, vdi_catalyst_finalize(catalyst));
-  MPI_Finalize();
-  return wrong == 0 ? 0 : 1;
+  check("finalize", 0, vdi_catalyst_finalize(catalyst));
+  return end(wrong);
 }

@@ -9,19 +9,20 @@
 #include <unistd.h>
 
 #include "catalyst_adaptor/vdi_catalyst.h"
+#include "tests/catalyst_adaptor/expect.h"
 
 enum { N = 12, MOST_STEPS = 100000 };
 
 static int wrong;
 
-static void expect(int holds, const char* what) {
+static void ensure(int holds, const char* what) {
   if (holds) return;
   fprintf(stderr, "FAILED  %s\n", what);
   wrong = 1;
 }
 
 /* If a parameter can't be declared, the call returns the given value, and the error's text has the reason. */
-static void declare_badly(vdi_catalyst* catalyst, int rank) {
+static void declare_badly(vdi_catalyst* catalyst, int rank, int ranks) {
   const struct {
     const char* name;
     double value, low, high;
@@ -33,20 +34,18 @@ static void declare_badly(vdi_catalyst* catalyst, int rank) {
   for (size_t i = 0; i < sizeof bad / sizeof *bad; ++i) {
     const double value =
         vdi_catalyst_parameter_f64(catalyst, bad[i].name, bad[i].value, bad[i].low, bad[i].high);
-    expect(memcmp(&value, &bad[i].value, sizeof value) == 0, "a parameter that can't be has its value");
-    expect(strstr(vdi_catalyst_error(catalyst), bad[i].told) != NULL, bad[i].told);
+    ensure(memcmp(&value, &bad[i].value, sizeof value) == 0, "a parameter that can't be has its value");
+    ensure(strstr(vdi_catalyst_error(catalyst), bad[i].told) != NULL, bad[i].told);
   }
-  int ranks = 0;
-  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
   if (ranks > 1) {
     const double differs = vdi_catalyst_parameter_f64(catalyst, rank == 0 ? "a" : "b", 1.0, 0.0, 2.0);
-    expect(differs == 1.0 && strstr(vdi_catalyst_error(catalyst), "different parameters") != NULL,
+    ensure(differs == 1.0 && strstr(vdi_catalyst_error(catalyst), "different parameters") != NULL,
            "ranks ask for different parameters");
   }
-  expect(vdi_catalyst_parameter_i64(catalyst, "a", 1, 0, INT64_MAX) == 1 &&
+  ensure(vdi_catalyst_parameter_i64(catalyst, "a", 1, 0, INT64_MAX) == 1 &&
              strstr(vdi_catalyst_error(catalyst), "beyond 2^53") != NULL,
          "whole numbers that a double doesn't have");
-  expect(vdi_catalyst_parameter_f64(NULL, "a", 7.0, 0.0, 2.0) == 7.0, "a null handle");
+  ensure(vdi_catalyst_parameter_f64(NULL, "a", 7.0, 0.0, 2.0) == 7.0, "a null handle");
 }
 
 static void check(int code) {
@@ -58,15 +57,12 @@ static void check(int code) {
 int main(int argc, char** argv) {
   static float field[N + 1][N + 1][N + 1];
   int rank = 0;
-  MPI_Init(&argc, &argv);
-  MPI_Comm_rank(MPI_COMM_WORLD, &rank);
+  int ranks = 0;
+  begin(&argc, &argv, &rank, &ranks);
   if (argc < 2) MPI_Abort(MPI_COMM_WORLD, 2);
   vdi_catalyst* catalyst = NULL;
-  const char* scripts[] = {argv[1]};
-  const int32_t comm = MPI_Comm_c2f(MPI_COMM_WORLD);
-  check(argv[1][0] == '{' ? vdi_catalyst_initialize_json(comm, argv[1], &catalyst)
-                          : vdi_catalyst_initialize(comm, 1, scripts, &catalyst));
-  declare_badly(catalyst, rank);
+  check(initialize_any(argv[1], &catalyst));
+  declare_badly(catalyst, rank, ranks);
 
   const vdi_catalyst_block block = {
       {N, N, N}, {0, 0, 0}, {0, 0, 0}, {(double)rank * N, 0.0, 0.0}, {1.0, 1.0, 1.0}};
@@ -94,12 +90,10 @@ int main(int argc, char** argv) {
     check(vdi_catalyst_execute(catalyst, step, 0.5 * step));
     usleep(20000);
   }
-  expect(vdi_catalyst_parameter_i64(catalyst, "level", 1, 0, 2) == 1 &&
+  ensure(vdi_catalyst_parameter_i64(catalyst, "level", 1, 0, 2) == 1 &&
              strstr(vdi_catalyst_error(catalyst), "another type") != NULL,
          "a parameter of another type");
   fclose(said);
   check(vdi_catalyst_finalize(catalyst));
-  MPI_Allreduce(MPI_IN_PLACE, &wrong, 1, MPI_INT, MPI_MAX, MPI_COMM_WORLD);
-  MPI_Finalize();
-  return wrong;
+  return end(wrong);
 }
