@@ -3,29 +3,17 @@
 set -uo pipefail
 vdi=$1
 read -r -a mpirun <<<"$2"
+# shellcheck source=tests/apps/works.sh
+source "$(dirname "$0")/works.sh"
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 cd "$folder" || exit 1
-failures=0
-
-fail() {
-  echo "FAILED  $*"
-  failures=$((failures + 1))
-}
-# works <what> command...: exit status 0.
-works() {
-  local what=$1
-  shift
-  "$@" >out.txt 2>err.txt || { fail "$what: status $?"; cat out.txt err.txt; }
-}
-# refused <status> <pattern> command...: that exit status, one line that matches.
-refused() {
-  local status=$1 pattern=$2
+# compared <what> <condition on c> <options of compare...>: c, what vdi compare says of two pictures, meets the condition.
+compared() {
+  local what=$1 condition=$2
   shift 2
-  "$@" >out.txt 2>err.txt
-  local got=$?
-  [ $got -eq "$status" ] || fail "status $got, not $status: $*"
-  grep -qiE "$pattern" err.txt || { fail "no '$pattern' in what is said of: $*"; cat err.txt; }
+  works "$what" "$vdi" compare --json "$@"
+  python3 -c "import json; c = json.load(open('out.txt')); assert $condition, c" || fail "$what"
 }
 small=(--size 24x20x16 --resolution 80x60 --supersegments 8)
 
@@ -34,13 +22,10 @@ for joint in shared gap cells; do
   works "generate" "$vdi" generate --field turbulence "${small[@]}" --joint "$joint" -o one.vdi --flat one.png
   works "generate on 3 ranks" "${mpirun[@]}" 3 "$vdi" generate --field turbulence "${small[@]}" --joint "$joint" \
     --blocks 3x2x2 --layout random -o three.vdi --flat three.png
-  works "compare" "$vdi" compare --json one.png three.png
-  python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "$joint: ranks differ"
+  compared "$joint: ranks differ" "c['max_error'] <= 1" one.png three.png
   works "render" "$vdi" render three.vdi -o turned.png --azimuth 0 20
-  works "compare" "$vdi" compare --json one.png turned_0deg.png
-  python3 -c "import json; r = json.load(open('out.txt')); assert r['ssim'] > 0.995, r" || fail "$joint: not the picture"
-  works "compare" "$vdi" compare --json one.png turned_20deg.png
-  python3 -c "import json; r = json.load(open('out.txt')); assert r['ssim'] < 0.99, r" || fail "$joint: nothing turned"
+  compared "$joint: not the picture" "c['ssim'] > 0.995" one.png turned_0deg.png
+  compared "$joint: nothing turned" "c['ssim'] < 0.99" one.png turned_20deg.png
 done
 # Without --flat no rank ever has the whole VDI. The file must be the same.
 works "written from where it is" "$vdi" generate --field turbulence "${small[@]}" --joint cells -o one_written.vdi
@@ -56,19 +41,16 @@ grep -q "compact precision" out.txt || fail "info doesn't tell the precision"
 grep -q "array .* of \(points\|cells\), from " out.txt || fail "info doesn't tell array and range"
 grep -q "opacity .* nodes from .*, unit distance " out.txt || fail "info doesn't tell the opacity function"
 works "full precision" "$vdi" generate --field turbulence "${small[@]}" --joint cells --precision full -o full.vdi --flat full.png
-works "compare" "$vdi" compare --json one.png full.png
-python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "compact isn't full's picture"
+compared "compact isn't full's picture" "c['max_error'] <= 1" one.png full.png
 [ $((2 * $(stat -c %s one.vdi))) -lt "$(stat -c %s full.vdi)" ] || fail "compact is no smaller"
 works "render" "$vdi" render full.vdi -o turned.png --azimuth 20
 works "render" "$vdi" render full.vdi -o constant.png --azimuth 20 --reconstruction constant
-works "compare" "$vdi" compare --json turned.png constant.png
-python3 -c "import json; r = json.load(open('out.txt')); assert 0.9 < r['ssim'] < 1, r" || fail "constant isn't like smooth"
+compared "constant isn't like smooth" "0.9 < c['ssim'] < 1" turned.png constant.png
 refused 2 "reconstruction" "$vdi" render full.vdi -o x.png --reconstruction cubic
 works "total budget" "$vdi" generate --field mixing "${small[@]}" --budget total --fill 0.5 -o need.vdi --flat need.png --dvr need_dvr.png
 works "equal budget" "$vdi" generate --field mixing "${small[@]}" -o equal.vdi
 [ $((10 * $(stat -c %s need.vdi))) -lt $((8 * $(stat -c %s equal.vdi))) ] || fail "half of the supersegments are no smaller"
-works "compare" "$vdi" compare --json need.png need_dvr.png
-python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "a total budget isn't true at V_O"
+compared "a total budget isn't true at V_O" "c['max_error'] <= 1" need.png need_dvr.png
 refused 2 "merge" "$vdi" generate --field sphere "${small[@]}" --budget total --algorithm bisection -o x.vdi
 refused 2 "fill" "$vdi" generate --field sphere "${small[@]}" --fill 0.5 -o x.vdi
 refused 2 "budget" "$vdi" generate --field sphere "${small[@]}" --budget each -o x.vdi
@@ -85,10 +67,8 @@ for blend in maximum minimum "isosurface --isovalues 0.3 0.5 0.7"; do
   works "$blend" "$vdi" generate --field mixing "${small[@]}" --joint cells --blend "${mode[@]}" --dvr blend_one.png
   works "$blend on 3 ranks" "${mpirun[@]}" 3 "$vdi" generate --field mixing "${small[@]}" --joint cells --blocks 3x2x2 \
     --layout random --blend "${mode[@]}" --dvr blend_three.png
-  works "compare" "$vdi" compare --json blend_one.png blend_three.png
-  python3 -c "import json; r = json.load(open('out.txt')); assert r['ssim'] > 0.999, r" || fail "$blend: ranks differ"
-  works "compare" "$vdi" compare --json blend_one.png need_dvr.png
-  python3 -c "import json; r = json.load(open('out.txt')); assert r['ssim'] < 0.98, r" || fail "$blend: as composite"
+  compared "$blend: ranks differ" "c['ssim'] > 0.999" blend_one.png blend_three.png
+  compared "$blend: as composite" "c['ssim'] < 0.98" blend_one.png need_dvr.png
   refused 2 "composite blending only" "$vdi" generate --field mixing "${small[@]}" --blend "${mode[@]}" -o x.vdi --dvr x.png
 done
 refused 2 "at least one isovalue" "$vdi" generate --field mixing "${small[@]}" --blend isosurface --dvr x.png
@@ -116,8 +96,7 @@ cmp cut.png kept.png || fail "a margin changes the picture"
 works "info" "$vdi" info kept.vdi
 grep -q "picture *80 x 60, and a margin of" out.txt || fail "info doesn't tell the margin"
 works "render" "$vdi" render kept.vdi -o kept_again.png
-works "compare" "$vdi" compare --json kept.png kept_again.png
-python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 2, r" || fail "not the picture's own view"
+compared "not the picture's own view" "c['max_error'] <= 2" kept.png kept_again.png
 refused 2 "margin" "$vdi" generate "${near[@]}" --margin 5 -o x.vdi
 
 works "bench all around" "$vdi" bench --suite viewpoints --fields turbulence "${small[@]}" --viewpoints 3 --zooms 4 \
@@ -168,8 +147,7 @@ json.dump({"file": "v.raw", "dims": [10, 8, 6], "type": "u16", "spacin": [1, 1, 
 P
 works "raw" "$vdi" generate --raw v.json --resolution 40x30 --flat raw.png
 works "raw on 2 ranks" "${mpirun[@]}" 2 "$vdi" generate --raw v.json --resolution 40x30 --blocks 2x2x1 --flat raw2.png
-works "compare" "$vdi" compare --json raw.png raw2.png
-python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "raw: ranks differ"
+compared "raw: ranks differ" "c['max_error'] <= 1" raw.png raw2.png
 # Each time step equals a run with that step alone, with the first step's camera and transfer function.
 python3 - <<'P'
 import json
@@ -185,8 +163,7 @@ for step in 0 1 2; do works "a step" "$vdi" generate --raw s$step.json --resolut
 works "steps on 2 ranks" "${mpirun[@]}" 2 "$vdi" generate --raw s0.json s1.json s2.json --resolution 40x30 --step 8 \
   --time 0.5 --interval 0.25 -o steps.vdi --flat steps.png
 for step in 0 1 2; do
-  works "compare" "$vdi" compare --json alone$step.png "$(printf 'steps_%04d.png' $((8 + step)))"
-  python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "step $step isn't itself"
+  compared "step $step isn't itself" "c['max_error'] <= 1" alone$step.png "$(printf 'steps_%04d.png' $((8 + step)))"
 done
 works "info" "$vdi" info steps_0009.vdi
 if ! grep -q "step 9" out.txt || ! grep -q "0.75" out.txt; then
@@ -207,8 +184,7 @@ for ranks in 1 2; do
   refused 1 "time step 1: .*s9.raw" "${mpirun[@]}" $ranks "$vdi" generate --raw s0.json s9.json s1.json s9.json s2.json \
     --resolution 40x30 --flat "left$ranks.png"
   for step in 0 2 4; do
-    works "compare" "$vdi" compare --json alone$((step / 2)).png "$(printf "left${ranks}_%04d.png" $step)"
-    python3 -c "import json; r = json.load(open('out.txt')); assert r['max_error'] <= 1, r" || fail "step $step of a broken series"
+    compared "step $step of a broken series" "c['max_error'] <= 1" alone$((step / 2)).png "$(printf "left${ranks}_%04d.png" $step)"
   done
   pictures=("left${ranks}_"*)
   [ ${#pictures[@]} -eq 3 ] || fail "a broken series has other pictures"

@@ -3,20 +3,15 @@
 set -uo pipefail
 vdi=$1
 read -r -a mpirun <<<"$2"
+# shellcheck source=tests/apps/works.sh
+source "$(dirname "$0")/../apps/works.sh"
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 cd "$folder" || exit 1
-failures=0
 
-# works <what> command...: exit status 0.
-works() {
-  local what=$1
-  shift
-  "$@" >out.txt 2>err.txt || { echo "FAILED  $what: status $?"; cat out.txt err.txt; failures=$((failures + 1)); }
-}
 # holds <what>: the Python program from standard input finds nothing wrong.
 holds() {
-  python3 - || { echo "FAILED  $1"; cat out.txt err.txt; failures=$((failures + 1)); }
+  python3 - || { fail "$1"; cat out.txt err.txt; }
 }
 small=(--fields interface --size 24x20x18 --resolution 80x60 --supersegments 8 --repeats 2)
 
@@ -89,23 +84,15 @@ row, = json.load(open("two.json"))["rows"]
 assert row["ranks"] == 2 and row["frame_speedup"] is None and row["vdis_per_second"] is None, row
 P
 works "a suite with itself" "$vdi" bench --compare ranks.json ranks.json
-grep -q "^18 rows" out.txt || { echo "FAILED  rows of several rank counts are mixed up"; failures=$((failures + 1)); }
+grep -q "^18 rows" out.txt || fail "rows of several rank counts are mixed up"
 for wrong in "--rank-counts 3" "--layouts spiral" "--size-per-rank 5x5" "--scaling both"; do
   read -r -a options <<<"$wrong"
-  if "${mpirun[@]}" 2 "$vdi" bench --suite ranks "${small[@]}" "${options[@]}" >out.txt 2>err.txt; then
-    echo "FAILED  $wrong was taken"
-    failures=$((failures + 1))
-  fi
-  grep -q "^vdi: " err.txt || { echo "FAILED  nothing is said of $wrong"; failures=$((failures + 1)); }
+  fails "^vdi: " "${mpirun[@]}" 2 "$vdi" bench --suite ranks "${small[@]}" "${options[@]}"
 done
 
 # The rival: volume rendering composited by IceT has our picture, wherever the blocks are.
 if [ "$3" != icet ]; then
-  if "${mpirun[@]}" 2 "$vdi" bench --rival icet "${small[@]}" >out.txt 2>err.txt; then
-    echo "FAILED  a rival that isn't there"
-    failures=$((failures + 1))
-  fi
-  grep -q "built without IceT" err.txt || { echo "FAILED  nothing is said of IceT"; failures=$((failures + 1)); }
+  fails "built without IceT" "${mpirun[@]}" 2 "$vdi" bench --rival icet "${small[@]}"
   exit $((failures > 0))
 fi
 rival=(--rival icet --fields mixing --size 24x20x18 --resolution 80x60 --supersegments 8 --repeats 1 --frames 0)
@@ -131,9 +118,5 @@ for name in ("slabs_shared", "random_cells", "ranks"):
         values = 24 * 20 * 18 * 4  # and some that several blocks have
         assert row["rival_redistributed_bytes"] < 1.5 * values, (name, row)
 P
-if "$vdi" bench --rival icet "${small[@]}" >out.txt 2>err.txt; then
-  echo "FAILED  a rival without MPI"
-  failures=$((failures + 1))
-fi
-grep -q "mpirun" err.txt || { echo "FAILED  nothing is said of mpirun"; failures=$((failures + 1)); }
+fails "mpirun" "$vdi" bench --rival icet "${small[@]}"
 exit $((failures > 0))
