@@ -91,6 +91,8 @@ def elsewhere():
     for camera in ([80, 56, 92], [-60, 30, 110], [0, -130, 20]):
         seen = screenshot(view, "from", camera)
         compare(seen, rendered(view, "from"), 0.995, "from {}, as the tool renders it".format(camera))
+    simple.Render(view)
+    check(display.VDIAngle == 1 and pvtest.angle_in(view) == "", "pvbatch, which has no windows, says no angle")
     view.CameraParallelProjection, view.CameraParallelScale = 1, 40
     compare(screenshot(view, "parallel", [-60, 30, 110]), rendered(view, "parallel"), 0.995, "in parallel projection")
     view.CameraParallelProjection = 0
