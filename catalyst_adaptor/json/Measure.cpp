@@ -131,7 +131,8 @@ class Sweep {
   int component_;  // or magnitude, or phase
 };
 
-/// The part of a block; nullopt if it owns no value.
+/// The part of a block; nullopt if it owns no value. A value stands for the cell or point beside which its
+/// array's offset puts it, because the owned box doesn't move with the values.
 std::optional<Measure::OwnedPart> Measure::partOf(std::size_t index, const Block& block) {
   constexpr double least = 1e-3;  // share of a spacing by which coinciding faces may differ
   OwnedPart part;
@@ -140,7 +141,7 @@ std::optional<Measure::OwnedPart> Measure::partOf(std::size_t index, const Block
     const double spacing = block.spacing[axis];
     std::vector<double>& extents = part.extents[static_cast<std::size_t>(axis)];
     for (int i = 0; i < block.dims[axis]; ++i) {
-      const double middle = block.origin[axis] + i * spacing;
+      const double middle = block.origin[axis] + (i - block.offset[axis]) * spacing;
       const double extent = std::min(middle + 0.5 * spacing, block.owned.hi[axis]) -
                             std::max(middle - 0.5 * spacing, block.owned.lo[axis]);
       if (!(extent > least * spacing)) continue;

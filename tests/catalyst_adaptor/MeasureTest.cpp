@@ -254,7 +254,7 @@ TEST_CASE("a measure follows the array to another block with the same first poin
   }
 }
 
-TEST_CASE("a phase is measured, and an offset moves the parts that count") {
+TEST_CASE("a phase is measured, and an offset doesn't change what a value counts") {
   const comm::Communicator world = comm::Communicator::world();
   std::vector<double> pairs;
   for (int i = 0; i < 64; ++i) {
@@ -276,5 +276,47 @@ TEST_CASE("a phase is measured, and an offset moves the parts that count") {
   Measure mean({.measure = Kind::Mean, .field = "g", .cells = {}, .component = -1, .above = {}, .below = {}});
   CHECK(mean.of(world, fields).value() == Approx(1.5));
   fields.set(Fields::offsetChange("g", true, {-0.5, 0.0, 0.0}));
-  CHECK(mean.of(world, fields).value() == Approx(6.0 / 3.5));  // half of the first value's cell is inside
+  CHECK(mean.of(world, fields).value() == Approx(1.5));
+}
+
+TEST_CASE("the mean of a staggered field is the same for one slab and for two") {
+  const comm::Communicator world = comm::Communicator::world();
+  const bool cells = GENERATE(true, false);
+  const double offset = GENERATE(-0.5, 0.25, 0.5);
+  INFO((cells ? "cells, offset " : "points, offset ") << offset);
+  const auto blockAt = [&](int first, int count) {
+    return vdi_catalyst_block{
+        {count, 1, 1}, {0, 0, 0}, {0, 0, 0}, {1.0 * first, 0.0, 1.0 * world.rank()}, {1.0, 1.0, 1.0}};
+  };
+  constexpr int length = 8;
+  const auto square = [](int x) { return static_cast<double>(x * x); };
+  // Squares along x: a wrong weight at either end of a slab changes their mean.
+  const auto valuesOf = [&](const vdi_catalyst_block& block) {
+    const int more = cells ? 0 : 1;
+    std::vector<double> values;
+    for (int row = 0; row < (1 + more) * (1 + more); ++row) {
+      for (int x = 0; x < block.cells[0] + more; ++x)
+        values.push_back(square(static_cast<int>(block.origin[0]) + x));
+    }
+    return values;
+  };
+  double sum = 0.0;
+  for (int x = 0; x < length; ++x) sum += cells ? square(x) : 0.5 * (square(x) + square(x + 1));
+  for (const int split : {0, 3}) {
+    std::vector<vdi_catalyst_block> blocks{blockAt(split, length - split)};
+    if (split > 0) blocks.push_back(blockAt(0, split));
+    Fields fields;
+    fields.setBlocks(blocks);
+    fields.set(Fields::offsetChange("f", cells, {offset, 0.0, 0.0}));
+    std::vector<std::vector<double>> values;
+    std::vector<StridedValues> strided;
+    for (const vdi_catalyst_block& block : blocks) {
+      const std::vector<double>& own = values.emplace_back(valuesOf(block));
+      strided.push_back(fields.inOrder(block, VDI_CATALYST_F64, cells, 1, own.data()));
+    }
+    fields.set(Fields::arrayChange("f", cells, VDI_CATALYST_F64, strided));
+    CHECK(*measured(Kind::Mean, world, fields) == Approx(sum / length));
+    CHECK(*measured(Kind::Max, world, fields) == square(cells ? length - 1 : length));
+    CHECK(*measured(Kind::Min, world, fields) == 0.0);
+  }
 }
