@@ -73,6 +73,8 @@ class Fields {
   std::vector<NamedArray> arrays() const;
   /// All particles, by name.
   const std::map<std::string, ParticleArray>& particles() const { return particles_; }
+  /// The offset of an array's values, in cells. It may be given before the array.
+  glm::dvec3 offsetOf(const std::string& name, bool cells) const;
 
   int componentsOf(const std::string& name, bool cells) const;  // 1 without blocks that have it
   /// An array's values where the simulation has them, one for each block; null where a block lacks them.
@@ -99,7 +101,6 @@ class Fields {
   };
   using Key = std::pair<bool, std::string>;  // whether it is one of cells, and the name
   const Array* find(const std::string& name, bool cells) const;
-  glm::dvec3 offsetOf(const std::string& name, bool cells) const;
   void put(std::map<Key, Array>& fresh) noexcept;
 
   std::vector<vdi_catalyst_block> blocks_;

@@ -399,7 +399,8 @@ bool IsolatedRun::hasNamedFields() const {
 StepFields IsolatedRun::fieldsOf(bool namedAlone) const {
   StepFields all;
   all.arrays = self_.fields.arrays();
-  for (const auto& [name, particles] : self_.fields.particles()) all.particles.emplace_back(name, particles);
+  for (const auto& [name, particles] : self_.fields.particles())
+    all.particles.push_back({name, particles, self_.fields.offsetOf(name, true)});
   if (!namedAlone) return all;
   std::vector<std::string> names{options_.run->field};
   if (options_.run->when) names.push_back(options_.run->when->field);
@@ -407,7 +408,8 @@ StepFields IsolatedRun::fieldsOf(bool namedAlone) const {
     return std::ranges::find(names, name) == names.end();
   };
   std::erase_if(all.arrays, [&](const Fields::NamedArray& array) { return isUnnamed(array.name); });
-  std::erase_if(all.particles, [&](const auto& particles) { return isUnnamed(particles.first); });
+  std::erase_if(all.particles,
+                [&](const StepFields::NamedParticles& particles) { return isUnnamed(particles.name); });
   return all;
 }
 

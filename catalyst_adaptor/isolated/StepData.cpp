@@ -81,8 +81,9 @@ StepWriter::StepWriter(std::uint64_t version, const std::vector<vdi_catalyst_blo
     }
   }
   head.put(std::uint64_t{fields_.particles.size()});
-  for (const auto& [name, array] : fields_.particles) {
+  for (const auto& [name, array, offset] : fields_.particles) {
     head.putText(name);
+    for (int axis = 0; axis < 3; ++axis) head.put(offset[axis]);
     head.put(array.kind);
     head.put(std::uint64_t{array.particles.count});
     for (const NumberColumn& column : columnsOf(array.particles)) {
@@ -121,9 +122,10 @@ void StepWriter::write(std::span<std::byte> to) const {
       if (values.first != nullptr) values.copyTo(to.data() + offsets_[next++]);
     }
   }
-  for (const auto& [name, array] : fields_.particles) {
-    for (const NumberColumn& column : columnsOf(array.particles)) {
-      if (column) copyColumn(column, countOf(column, array.particles.count), to.data() + offsets_[next++]);
+  for (const StepFields::NamedParticles& particles : fields_.particles) {
+    const Particles& own = particles.array.particles;
+    for (const NumberColumn& column : columnsOf(own)) {
+      if (column) copyColumn(column, countOf(column, own.count), to.data() + offsets_[next++]);
     }
   }
 }
@@ -157,6 +159,7 @@ StepData StepData::read(std::span<const std::byte> from) {
     StepData::Particles& one = step.particles.emplace_back();
     vdi_catalyst_particles& given = one.given;
     one.name = head.takeText();
+    for (double& offset : one.offset) offset = head.take<double>();
     given.kind = head.take<DepositKind>() == DepositKind::Density ? VDI_CATALYST_DENSITY : VDI_CATALYST_SUM;
     given.count = static_cast<std::int64_t>(head.take<std::uint64_t>());
     const auto column = [&](const void*& first, std::int32_t& type, std::int64_t& stride) {

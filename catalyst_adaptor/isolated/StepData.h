@@ -3,9 +3,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <glm/glm.hpp>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "catalyst_adaptor/Fields.h"
@@ -17,8 +17,13 @@ namespace vdi::catalyst {
 
 /// The fields of a run that are handed over.
 struct StepFields {
+  struct NamedParticles {
+    std::string name;
+    ParticleArray array;
+    glm::dvec3 offset{0.0};  // of the array of cells that they become, in cells
+  };
   std::vector<Fields::NamedArray> arrays;
-  std::vector<std::pair<std::string, ParticleArray>> particles;  // by name
+  std::vector<NamedParticles> particles;
 };
 
 /// Places a step's data. The simulation makes one for each step that it hands over.
@@ -50,6 +55,7 @@ struct StepData {
   };
   struct Particles {
     std::string name;
+    double offset[3] = {};
     vdi_catalyst_particles given{};
   };
   std::uint64_t version = 0;  // another number means other blocks

@@ -37,6 +37,14 @@ struct Bytes {
   std::vector<std::uint64_t> words;
 };
 
+StepFields stepOf(const Fields& fields) {
+  StepFields step;
+  step.arrays = fields.arrays();
+  for (const auto& [name, particles] : fields.particles())
+    step.particles.push_back({name, particles, fields.offsetOf(name, true)});
+  return step;
+}
+
 template <typename Number>
 Number numberAt(const void* from, std::size_t index) {
   Number number;
@@ -69,11 +77,10 @@ TEST_CASE("fields arrive: strides, offsets, blocks that lack an array, particles
   given.position_stride = -12;
   given.weights = &weight;
   given.weight_type = VDI_CATALYST_F64;
+  fields.set(Fields::offsetChange("stars", true, {0.25, 0.0, -0.5}));
   fields.set(Fields::particlesChange("stars", particleArrayOf(&given)));
 
-  StepFields step;
-  step.arrays = fields.arrays();
-  for (const auto& [name, particles] : fields.particles()) step.particles.emplace_back(name, particles);
+  const StepFields step = stepOf(fields);
   const Bytes bytes(StepWriter(7, fields.blocks(), step, {{"feed", false, 0.5, 0.0, 1.0}}));
   const StepData got = StepData::read(bytes.all());
 
@@ -97,6 +104,8 @@ TEST_CASE("fields arrive: strides, offsets, blocks that lack an array, particles
 
   REQUIRE(got.particles.size() == 1);
   const vdi_catalyst_particles& stars = got.particles[0].given;
+  const auto& offset = got.particles[0].offset;
+  CHECK((offset[0] == 0.25 && offset[1] == 0.0 && offset[2] == -0.5));
   CHECK((got.particles[0].name == "stars" && stars.count == 2 && stars.kind == VDI_CATALYST_DENSITY));
   CHECK((stars.position_type == VDI_CATALYST_F32 && stars.position_stride == sizeof(float)));
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -118,9 +127,7 @@ TEST_CASE("no particles, and no blocks, arrive as none") {
   fields.set(Fields::arrayChange("E", true, VDI_CATALYST_F32, {}));
   vdi_catalyst_particles given{};
   fields.set(Fields::particlesChange("stars", particleArrayOf(&given)));
-  StepFields step;
-  step.arrays = fields.arrays();
-  for (const auto& [name, particles] : fields.particles()) step.particles.emplace_back(name, particles);
+  const StepFields step = stepOf(fields);
   const Bytes bytes(StepWriter(1, fields.blocks(), step, {}));
   const StepData got = StepData::read(bytes.all());
   REQUIRE(got.arrays.size() == 1);
@@ -137,8 +144,7 @@ TEST_CASE("a step that is cut short is refused") {
   fields.set(
       Fields::arrayChange("E", true, VDI_CATALYST_F32,
                           {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F32, true, 1, numbers.data())}));
-  StepFields step;
-  step.arrays = fields.arrays();
+  const StepFields step = stepOf(fields);
   const Bytes bytes(StepWriter(1, fields.blocks(), step, {}));
   for (const std::size_t size : {0U, 7U, 20U, 100U}) {
     CHECK_THROWS_AS(StepData::read(bytes.all().first(size)), std::runtime_error);

@@ -3,7 +3,7 @@
  * none. Arguments: a JSON text or file (or a script, which ends in .py), then the code that each step must
  * return. The array's name is V. Exit status 0 if all calls return what they should. VDI_TEST_FAULTS=1: there
  * are also particles that can't be deposited. VDI_TEST_LENGTHS=1: half of the particles have smoothing
- * lengths of two cells. */
+ * lengths of two cells, and the array's values lie beside the middles of cells. */
 #include <math.h>
 #include <mpi.h>
 #include <stdlib.h>
@@ -139,6 +139,11 @@ int main(int argc, char** argv) {
   }
   wrong += expect(rank, "set_blocks", VDI_CATALYST_OK, vdi_catalyst_set_blocks(catalyst, count, blocks));
   wrong += refuse_bad(catalyst, rank, ranks);
+  if (getenv("VDI_TEST_LENGTHS") != NULL) {
+    const double offset[] = {0.25, 0.0, -0.5};
+    wrong += expect(rank, "an offset", VDI_CATALYST_OK,
+                    vdi_catalyst_set_array_offset(catalyst, "V", VDI_CATALYST_CELLS, offset));
+  }
 
   /* Particles take the place of an array, and the other way round. */
   static double zeros[N * N * N];

@@ -127,6 +127,10 @@ class Worker {
     }
     for (const StepData::Particles& particles : data.particles) {
       code = vdi_catalyst_set_particles(catalyst_, particles.name.c_str(), &particles.given);
+      if (code == VDI_CATALYST_OK) {
+        code = vdi_catalyst_set_array_offset(catalyst_, particles.name.c_str(), VDI_CATALYST_CELLS,
+                                             particles.offset);
+      }
       if (code != VDI_CATALYST_OK) return code;
     }
     for (const Parameter& parameter : data.parameters) (void)inForceNow(parameter);
