@@ -32,6 +32,7 @@ std::int64_t fingerprintOf(const Parameter& parameter) {
 
 /// The value in force; nullopt after an error, which has been reported.
 std::optional<double> valueOf(Calls& self, Parameters& parameters, const char* name, Parameter parameter) {
+  self.error.clear();  // afterwards, its text tells whether this call failed
   int rank = 0;
   MPI_Comm_rank(self.comm, &rank);
   const Parameter* known = nullptr;  // on all ranks or on none, once they have agreed on the name

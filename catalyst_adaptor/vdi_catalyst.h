@@ -275,7 +275,7 @@ VDI_CATALYST_API int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, 
  * A run has 64 parameters at most. Bounds of the second function lie within 2^53 of 0. The functions return
  * `value` for a null or finalized handle, and after an error, which vdi_catalyst_error describes: an invalid
  * name, bounds that aren't finite, a value outside them, another type than before, or ranks that ask for
- * different parameters. */
+ * different parameters. After a success, vdi_catalyst_error returns "". */
 VDI_CATALYST_API double vdi_catalyst_parameter_f64(vdi_catalyst* catalyst, const char* name, double value,
                                                    double low, double high);
 VDI_CATALYST_API int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, const char* name, int64_t value,
@@ -287,7 +287,8 @@ VDI_CATALYST_API int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, cons
  * VDI_CATALYST_BAD_ARGUMENT: a run belongs to the process that began it. */
 VDI_CATALYST_API int vdi_catalyst_finalize(vdi_catalyst* catalyst);
 
-/* The text of the last error on this rank; "" if there was none. It is valid until the next call. */
+/* The text of the last error on this rank; "" if there was none, or if a parameter was asked for since then.
+ * It is valid until the next call. */
 VDI_CATALYST_API const char* vdi_catalyst_error(const vdi_catalyst* catalyst);
 
 #ifdef __cplusplus

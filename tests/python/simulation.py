@@ -37,12 +37,28 @@ with Catalyst(MPI.COMM_WORLD, [sys.argv[1]]) as catalyst:
     expect(ValueError, lambda: catalyst.set_array("V", values[1:] + values + values), "blocks")
     expect(ValueError, lambda: catalyst.set_array("V", [v[1:] for v in values]), "[z][y][x]")
     expect(ValueError, lambda: catalyst.set_array("V", [v > 0 for v in values]), "bool")
+    # A fault of one rank fails the call on all of them, and no rank waits.
+    if RANK == RANKS - 1:
+        expect(RuntimeError, lambda: catalyst.set_blocks([Block(cells=(0.5, N, N))]), "")
+        expect(ValueError, lambda: catalyst.set_array("V", [v[1:] for v in values]), "[z][y][x]")
+        expect(TypeError, lambda: catalyst.set_array("V", values, offset="abc"), "")
+        expect(ValueError, lambda: catalyst.set_particles("P", np.zeros((5, 2))), "[particle][3]")
+    else:
+        for refused in [lambda: catalyst.set_blocks([]), lambda: catalyst.set_array("V", values),
+                        lambda: catalyst.set_array("V", values, offset=(0, 0, 0)),
+                        lambda: catalyst.set_particles("P", np.zeros((5, 3)))]:
+            error = expect(CatalystError, refused, "rank %d: " % (RANKS - 1))
+            assert error.code == BAD_ARGUMENT, error.code
     expect(CatalystError, lambda: catalyst.execute(-1), "")
     assert catalyst.parameter("feed", 0.037, 0, 0.1) == 0.037
     whole = catalyst.parameter("waves", 3, 1, 9)
     assert whole == 3 and isinstance(whole, int), whole
     assert catalyst.parameter("feed", 0.05, 0, 0.1) == 0.037  # the first call has declared it
-    expect(ValueError, lambda: catalyst.parameter("feed", 1, 0, 0.1), "'feed' is 1, not from 0 to 0.1")
+    assert catalyst.parameter("feed", 1.0, 2, 0) == 0.037  # and its bounds
+    for _ in range(2):
+        expect(ValueError, lambda: catalyst.parameter("level", 9.0 if RANK == 0 else 0.5, 0, 1), '"level" is out of its bounds')
+    assert catalyst.parameter("level", 0.5 if RANK == 0 else -7, 0, 1.0) == 0.5  # the first rank's value counts
+    expect(ValueError, lambda: catalyst.parameter("high", 1, 0, float("inf")), "aren't finite")
     catalyst.set_array("W", values)
     expect(CatalystError, lambda: catalyst.execute(0, 0.0), "there is no array 'V'")
     catalyst.set_array("V", values)

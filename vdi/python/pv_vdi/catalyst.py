@@ -14,6 +14,7 @@ With `Catalyst(MPI.COMM_WORLD, json={"field": "V", "every": 10})` neither a scri
 All calls are collective over the communicator. vdi_catalyst.h says more about each.
 """
 
+import contextlib
 import ctypes
 import dataclasses
 import json as json_module
@@ -102,6 +103,24 @@ def _float_type(what, dtype):
     return _TYPES[dtype]
 
 
+def _particles(positions, weights, lengths, density):
+    """The particles as the engine takes them, and the arrays that they point to. Raises ValueError."""
+    columns = _columns(positions)
+    count = len(columns[0])
+    made = _Particles(count, _DENSITY if density else _SUM, _float_type("positions", columns[0].dtype),
+                      (ctypes.c_void_p * 3)(*(column.ctypes.data for column in columns)), columns[0].strides[0])
+    kept = [columns]
+    if weights is not None:
+        array, made.weight_stride = _numbers("weights", weights, count)
+        made.weights, made.weight_type = array.ctypes.data, _float_type("weights", array.dtype)
+        kept.append(array)
+    if lengths is not None:
+        array, made.length_stride = _numbers("lengths", lengths, count)
+        made.lengths, made.length_type = array.ctypes.data, _float_type("lengths", array.dtype)
+        kept.append(array)
+    return made, kept
+
+
 def _load():
     library = ctypes.CDLL(os.path.join(os.path.dirname(os.path.abspath(__file__)), LIBRARY))
     handle, text = ctypes.c_void_p, ctypes.c_char_p
@@ -132,6 +151,16 @@ def _as_pairs(array):
     return np.lib.stride_tricks.as_strided(part, array.shape + (2,), array.strides + (part.dtype.itemsize,), writeable=False)
 
 
+@contextlib.contextmanager
+def _or_refused(call, *arguments):
+    """If the block raises, makes a call whose arguments fail on all ranks, because the others wait in a call of that name."""
+    try:
+        yield
+    except Exception:
+        call(*arguments)
+        raise
+
+
 class Catalyst:
     """The engine, with its scripts or what `json` asks for. One with scripts can be made in a process, and one at a time with
     json; it ends with close() or its `with`."""
@@ -159,9 +188,11 @@ class Catalyst:
 
     def set_blocks(self, blocks):
         """This rank's blocks, none included; forgets all arrays."""
-        blocks = list(blocks)
-        made = (_Block * max(len(blocks), 1))(
-            *(_Block(tuple(b.cells), tuple(b.ghost_lo), tuple(b.ghost_hi), tuple(b.origin), tuple(b.spacing)) for b in blocks))
+        with _or_refused(self._library.vdi_catalyst_set_blocks, self._handle, -1, None):
+            blocks = list(blocks)
+            made = (_Block * max(len(blocks), 1))(
+                *(_Block(tuple(b.cells), tuple(b.ghost_lo), tuple(b.ghost_hi), tuple(b.origin), tuple(b.spacing))
+                  for b in blocks))
         self._check(self._library.vdi_catalyst_set_blocks(self._handle, len(blocks), made))
         self._blocks = blocks
         self._kept = {}
@@ -174,8 +205,21 @@ class Catalyst:
 
         Arrays are kept alive: change them in place between steps, or set others. They are used where they are, whatever their
         strides: slices, transposed ones, one field of several. Raises ValueError for a shape that the block doesn't have and
-        for a type that the engine doesn't know."""
-        arrays = list(arrays)
+        for a type that the engine doesn't know; ranks without such a fault raise CatalystError then."""
+        association = _POINTS if points else _CELLS
+        with _or_refused(self._library.vdi_catalyst_set_array_strided, self._handle, b"refused", -1, association, 1, None,
+                         (_Strides * 1)()):
+            arrays = list(arrays)
+            number, components, pointers, strides = self._given(name, arrays, points)
+            offsets = None if offset is None else (ctypes.c_double * 3)(*offset)
+        self._check(self._library.vdi_catalyst_set_array_strided(
+            self._handle, name.encode(), number, association, components, pointers, strides))
+        self._kept[association, name] = arrays
+        if offsets is not None:
+            self._check(self._library.vdi_catalyst_set_array_offset(self._handle, name.encode(), association, offsets))
+
+    def _given(self, name, arrays, points):
+        """The type, the number of components, the pointers and the strides of one array for each block. Raises ValueError."""
         if len(arrays) != len(self._blocks):
             raise ValueError("%d arrays for %d blocks" % (len(arrays), len(self._blocks)))
         # A view of complex numbers as pairs is no copy, and follows the values when these change.
@@ -194,13 +238,7 @@ class Catalyst:
         strides = (_Strides * max(len(views), 1))(
             *(_Strides() if view is None else _Strides(view.strides[2::-1], view.strides[3] if view.ndim == 4 else 0)
               for view in views))
-        association = _POINTS if points else _CELLS
-        self._check(self._library.vdi_catalyst_set_array_strided(
-            self._handle, name.encode(), _TYPES[types.pop()], association, components.pop(), pointers, strides))
-        self._kept[association, name] = arrays
-        if offset is not None:
-            self._check(self._library.vdi_catalyst_set_array_offset(
-                self._handle, name.encode(), association, (ctypes.c_double * 3)(*offset)))
+        return _TYPES[types.pop()], components.pop(), pointers, strides
 
     def set_particles(self, name, positions, weights=None, lengths=None, density=False):
         """Makes an array of cells of this rank's particles, which may lie in blocks of any rank: their weight in each cell, or
@@ -209,20 +247,10 @@ class Catalyst:
         vdi_catalyst.h has the rules.
 
         Arrays are kept alive and used where they are: change them in place between steps, or set others when their number
-        changes. Raises ValueError for shapes that don't fit and for types other than float32 and float64."""
-        columns = _columns(positions)
-        count = len(columns[0])
-        made = _Particles(count, _DENSITY if density else _SUM, _float_type("positions", columns[0].dtype),
-                          (ctypes.c_void_p * 3)(*(column.ctypes.data for column in columns)), columns[0].strides[0])
-        kept = [columns]
-        if weights is not None:
-            array, made.weight_stride = _numbers("weights", weights, count)
-            made.weights, made.weight_type = array.ctypes.data, _float_type("weights", array.dtype)
-            kept.append(array)
-        if lengths is not None:
-            array, made.length_stride = _numbers("lengths", lengths, count)
-            made.lengths, made.length_type = array.ctypes.data, _float_type("lengths", array.dtype)
-            kept.append(array)
+        changes. Raises ValueError for shapes that don't fit and for types other than float32 and float64; ranks without such
+        a fault raise CatalystError then."""
+        with _or_refused(self._library.vdi_catalyst_set_particles, self._handle, b"refused", None):
+            made, kept = _particles(positions, weights, lengths, density)
         self._check(self._library.vdi_catalyst_set_particles(self._handle, name.encode(), made))
         self._kept[_CELLS, name] = kept  # an array of cells, as far as the engine is concerned
 
@@ -236,14 +264,17 @@ class Catalyst:
 
     def parameter(self, name, value, low, high):
         """A number from `low` to `high` that viewers may change, where a script or the JSON lets them. Returns the value in
-        force, the same on all ranks: `value`, as the first call had it, until a viewer sets another. It takes whole numbers
-        only where all three are of type int. To be called at each step, on all ranks; values change in execute alone. Raises
-        ValueError unless `value` lies between finite bounds."""
+        force, the same on all ranks: `value`, as the first rank's first call had it, until a viewer sets another. Other ranks
+        may pass any value, and later calls any bounds, too. It takes whole numbers only where all three are of type int. To be
+        called at each step, on all ranks; values change in execute alone. Raises ValueError on all ranks unless the first value
+        lies between finite bounds, and for a name that can't be, another type than before, or a 65th parameter."""
         whole = all(isinstance(number, int) for number in (value, low, high))
-        if not (low <= value <= high) or abs(low) == float("inf") or abs(high) == float("inf"):
-            raise ValueError("the parameter '%s' is %s, not from %s to %s" % (name, value, low, high))
         ask = self._library.vdi_catalyst_parameter_i64 if whole else self._library.vdi_catalyst_parameter_f64
-        return ask(self._handle, name.encode(), value, low, high)
+        in_force = ask(self._handle, name.encode(), value, low, high)
+        error = self._library.vdi_catalyst_error(self._handle)  # empty after a success
+        if error:
+            raise ValueError(error.decode(errors="replace"))
+        return in_force
 
     def close(self):
         """Ends the run and its engine, before MPI is finalized. A second call does nothing."""
