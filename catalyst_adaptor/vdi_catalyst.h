@@ -14,13 +14,14 @@
  *     }
  *     vdi_catalyst_finalize(catalyst);                              before MPI_Finalize
  *
- * All functions are collective over the communicator. None ends the process. They return VDI_CATALYST_OK or a
- * code below, the same one on all ranks, and rank 0 prints a message to standard error. It prints a repeated
- * message in full once. A step that fails again gets one line, because its files are missing. After an error,
- * the next step works again, with the blocks and arrays from before. Values are used where they are: pointers
- * must stay valid, and their data unchanged, until vdi_catalyst_execute returns. The host holds copies of
- * only the layers beside blocks, and of whole blocks if the blocks' scalar types differ. Arrays made of
- * particles take 4 bytes a cell.
+ * All functions but vdi_catalyst_error are collective over the communicator: each rank makes all calls in the
+ * same order, also a rank without blocks (count 0, null pointers). None ends the process. They return
+ * VDI_CATALYST_OK or a code below, the same one on all ranks, and rank 0 prints a message to standard error.
+ * It prints a repeated message in full once. A step that fails again gets one line, because its files are
+ * missing. After an error, the next step works again, with the blocks and arrays from before. Values are used
+ * where they are: pointers must stay valid, and their data unchanged, until vdi_catalyst_execute returns. The
+ * host holds copies of only the layers beside blocks, and of whole blocks if the blocks' scalar types differ.
+ * Arrays made of particles take 4 bytes a cell.
  *
  * Scripts are Catalyst scripts of version 2 (paraview.catalyst). They find the blocks, a
  * vtkPartitionedDataSet with one vtkImageData per block, under the name "grid":
@@ -283,8 +284,8 @@ VDI_CATALYST_API int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, cons
 
 /* Ends the scripts and the engine, and frees `catalyst`. A second call only returns
  * VDI_CATALYST_BAD_ARGUMENT. After MPI_Finalize this and all other functions do so, too, and this one prints
- * a message. In a process that the simulation forks, this one does nothing and returns 0, and the others return
- * VDI_CATALYST_BAD_ARGUMENT: a run belongs to the process that began it. */
+ * a message. In a process that the simulation forks, this one does nothing and returns 0, and the others
+ * return VDI_CATALYST_BAD_ARGUMENT: a run belongs to the process that began it. */
 VDI_CATALYST_API int vdi_catalyst_finalize(vdi_catalyst* catalyst);
 
 /* The text of the last error on this rank; "" if there was none, or if a parameter was asked for since then.
