@@ -15,14 +15,15 @@ extern "C" {
  * and a null *catalyst. In the isolated engine they return VDI_CATALYST_NOT_ISOLATED, on all ranks, for a run
  * that another engine has to carry out in this process.
  *
- * `go_on_with_json` is initialize_json for a run of which an earlier process has made a part: its files stay.
+ * `make_frames_of_json` is initialize_json in the processes that make an isolated run's frames. If `goes_on`,
+ * earlier processes have made a part of the run, whose files stay.
  * `set_clock`, which may be null, sets the time in seconds, since the run's start, that counts as that of the
  * next step. */
 typedef struct vdi_catalyst_functions {
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**);
   int (*initialize_pipelines)(int32_t, int32_t, const vdi_catalyst_pipeline*, vdi_catalyst**);
   int (*initialize_json)(int32_t, const char*, vdi_catalyst**);
-  int (*go_on_with_json)(int32_t, const char*, vdi_catalyst**);
+  int (*make_frames_of_json)(int32_t, const char*, int goes_on, vdi_catalyst**);
   int (*set_blocks)(vdi_catalyst*, int32_t, const vdi_catalyst_block*);
   int (*set_array)(vdi_catalyst*, const char*, int32_t, int32_t, const void* const*);
   int (*set_array_strided)(vdi_catalyst*, const char*, int32_t, int32_t, int32_t, const void* const*,
@@ -39,16 +40,16 @@ typedef struct vdi_catalyst_functions {
 } vdi_catalyst_functions;
 
 /* An engine's only symbol. Its name contains the version, so a library of another version lacks it. */
-#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_7
-#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_7"
+#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_8
+#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_8"
 enum { VDI_CATALYST_NOT_ISOLATED = -1 };
 VDI_CATALYST_API extern const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS;
 
 /* libvdi_catalyst.so exports these for the program in which the isolated engine makes frames
  * (isolated/process). They call the entries of these names of the engine for JSON, and set_clock does nothing
  * for other runs. */
-VDI_CATALYST_API int vdi_catalyst_go_on_with_json(int32_t fortran_communicator, const char* json,
-                                                  vdi_catalyst** catalyst);
+VDI_CATALYST_API int vdi_catalyst_make_frames_of_json(int32_t fortran_communicator, const char* json,
+                                                      int goes_on, vdi_catalyst** catalyst);
 VDI_CATALYST_API void vdi_catalyst_set_clock(vdi_catalyst* catalyst, double seconds);
 
 #ifdef __cplusplus

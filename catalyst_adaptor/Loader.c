@@ -36,8 +36,8 @@ static vdi_engine* json_run;
 /* The JSON run's handle until it is finalized. All other handles belong to the run of scripts, whose engine
  * knows its own. */
 static const vdi_catalyst* json_handle;
-/* The process that initialised first; 0: none has. A child that it forks has copies of its MPI connections, its
- * stream's sockets and its device, which don't work there, so no call reaches an engine. */
+/* The process that initialised first; 0: none has. A child that it forks has copies of its MPI connections,
+ * its stream's sockets and its device, which don't work there, so no call reaches an engine. */
 static pid_t owner;
 
 static int is_forked(void) {
@@ -120,7 +120,7 @@ typedef struct vdi_given {
   const vdi_catalyst_pipeline* pipelines;
   int32_t count;
   const char* json;
-  int kind; /* 0: scripts, 1: pipelines, 2: JSON, 3: JSON, to go on with */
+  int kind; /* 0: scripts, 1: pipelines, 2: JSON, 3: JSON whose frames are made here; count: if it goes on */
 } vdi_given;
 
 static int initialize_with(const vdi_engine* engine, int32_t communicator, const vdi_given* given,
@@ -133,7 +133,7 @@ static int initialize_with(const vdi_engine* engine, int32_t communicator, const
     case 2:
       return engine->functions->initialize_json(communicator, given->json, catalyst);
     default:
-      return engine->functions->go_on_with_json(communicator, given->json, catalyst);
+      return engine->functions->make_frames_of_json(communicator, given->json, given->count, catalyst);
   }
 }
 
@@ -196,8 +196,9 @@ int vdi_catalyst_initialize_json(int32_t fortran_communicator, const char* json,
   return initialize(fortran_communicator, &given, &json_run, catalyst);
 }
 
-int vdi_catalyst_go_on_with_json(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
-  const vdi_given given = {NULL, NULL, 0, json, 3};
+int vdi_catalyst_make_frames_of_json(int32_t fortran_communicator, const char* json, int goes_on,
+                                     vdi_catalyst** catalyst) {
+  const vdi_given given = {NULL, NULL, goes_on, json, 3};
   return initialize(fortran_communicator, &given, &json_run, catalyst);
 }
 

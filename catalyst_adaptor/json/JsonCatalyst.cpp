@@ -88,7 +88,10 @@ class Reading {
   std::string colors_;
 };
 
-int start(vdi_catalyst& self, const char* json, bool isGoingOn) {
+/// Where a run's frames are made: in the simulation, or in processes of their own, which may go on with it.
+enum class Place { Simulation, Process, NextProcess };
+
+int start(vdi_catalyst& self, const char* json, Place place) {
   int code = guarded(self, VDI_CATALYST_ENGINE, [&] {
     require(alive() == nullptr, "a run by JSON goes on in this process; finalize it first");
   });
@@ -99,22 +102,22 @@ int start(vdi_catalyst& self, const char* json, bool isGoingOn) {
   if (code != VDI_CATALYST_OK) return code;
   std::optional<Reading> reading;
   code = guarded(self, VDI_CATALYST_ENGINE, [&] { reading.emplace(self, *comm); });
-  if (code == VDI_CATALYST_OK) code = reading->read(json, isGoingOn);
+  if (code == VDI_CATALYST_OK) code = reading->read(json, place == Place::NextProcess);
   if (code != VDI_CATALYST_OK) return code;
   code = guarded(self, VDI_CATALYST_ENGINE, [&] {
     self.engine = std::make_unique<vdi::catalyst::RunEngine>(
         MPI_Comm_c2f(self.comm), std::move(*comm), std::move(reading->run), std::move(reading->map));
   });
   if (code != VDI_CATALYST_OK) return code;
-  return guardedTogether(self, VDI_CATALYST_ENGINE, [&] { self.engine->start(); });
+  return guardedTogether(self, VDI_CATALYST_ENGINE, [&] { self.engine->start(place != Place::Simulation); });
 }
 
-int initializeAny(int32_t fortran_communicator, const char* json, bool isGoingOn, vdi_catalyst** catalyst) {
+int initializeAny(int32_t fortran_communicator, const char* json, Place place, vdi_catalyst** catalyst) {
   // Loader.c has checked that MPI runs and that the handle is a communicator's, and *catalyst is null.
   std::unique_ptr<vdi_catalyst> self;
   int code = vdi::catalyst::makeHandle(fortran_communicator, self);
   if (code != VDI_CATALYST_OK) return code;
-  code = start(*self, json, isGoingOn);
+  code = start(*self, json, place);
   if (code == VDI_CATALYST_OK) {
     *catalyst = alive() = self.release();
   } else {
@@ -125,11 +128,12 @@ int initializeAny(int32_t fortran_communicator, const char* json, bool isGoingOn
 }
 
 int initializeJson(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
-  return initializeAny(fortran_communicator, json, false, catalyst);
+  return initializeAny(fortran_communicator, json, Place::Simulation, catalyst);
 }
 
-int goOnWithJson(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
-  return initializeAny(fortran_communicator, json, true, catalyst);
+int makeFramesOfJson(int32_t fortran_communicator, const char* json, int goesOn, vdi_catalyst** catalyst) {
+  const Place place = goesOn != 0 ? Place::NextProcess : Place::Process;
+  return initializeAny(fortran_communicator, json, place, catalyst);
 }
 
 void setClock(vdi_catalyst* catalyst, double seconds) {
@@ -194,7 +198,7 @@ const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
     nullptr,
     nullptr,
     initializeJson,
-    goOnWithJson,
+    makeFramesOfJson,
     setBlocks,
     Entries::setArray,
     Entries::setArrayStrided,

@@ -147,13 +147,13 @@ RunEngine::RunEngine(int fortranCommunicator, comm::Communicator comm, config::R
 
 RunEngine::~RunEngine() = default;
 
-void RunEngine::start() {
+void RunEngine::start(bool isIsolated) {
   state_->start();
-  open();
+  open(isIsolated);
 }
 
 /// Opens the root's files and stream.
-void RunEngine::open() {
+void RunEngine::open(bool isIsolated) {
   State& state = *state_;
   const bool isAnew = run_.existing == config::Existing::Overwrite;
   state.comm.together([&] {
@@ -162,7 +162,7 @@ void RunEngine::open() {
     if (run_.stream) state.stream = std::make_unique<LiveStream>(*run_.stream);
     // The log comes last, because a start that fails leaves no line in it, and doesn't empty it.
     if (run_.log.any()) {
-      const runlog::RunStart start{run_.field, state.comm.size(), std::time(nullptr)};
+      const runlog::RunStart start{run_.field, state.comm.size(), std::time(nullptr), isIsolated};
       using Before = runlog::RunLog::Before;
       state.log = std::make_unique<runlog::RunLog>(logFilesOf(run_.log), start,
                                                    isAnew ? Before::Goes : Before::Stays);

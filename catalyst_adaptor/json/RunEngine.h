@@ -33,8 +33,8 @@ class RunEngine {
   RunEngine& operator=(const RunEngine&) = delete;
 
   /// Call once, first. Finds the device, and starts the stream on the first rank, so that errors of either
-  /// are known before the first step.
-  void start();
+  /// are known before the first step. `isIsolated` tells the log that this process only makes frames.
+  void start(bool isIsolated);
   /// Whether the step may have a frame. This depends on the schedule, but not on conditions on the data. If
   /// only the first rank can tell, the others return false. Not collective.
   bool wants(std::int64_t step, double time) const;
@@ -54,7 +54,7 @@ class RunEngine {
   struct State;
   struct LoadedFrame;
   using Clock = std::chrono::steady_clock;
-  void open();
+  void open(bool isIsolated);
   bool isDue(std::int64_t step, double time);
   void deposit(Fields& fields, const std::string& name, std::int64_t step);
   bool isToBeMade(Fields& fields, std::int64_t step, double time);

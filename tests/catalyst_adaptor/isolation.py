@@ -129,6 +129,11 @@ def restart():
     assert len(told) == 1 and re.search("was killed by signal 9 .*; it starts again for the next frame", told[0]), told
     assert run.codes.count(ENGINE) == 1 and set(run.codes) == {0, ENGINE} and run.end == 0, run.codes
     assert not os.path.exists("once")
+    # Frames that the simulation didn't wait for aren't told as its wait.
+    records = [json.loads(line) for line in open("run.jsonl")]
+    starts = [record for record in records if record["event"] == "start"]
+    assert len(starts) == 2 and all(start["isolated"] for start in starts) and records[-1]["isolated"], records
+    assert any("; frames in processes of their own took " in line for line in run.lines), run.lines
     # At most the frame that was being made and the one after it are lost.
     assert len(made()) >= 6 and made()[-1] == "vdi_000007.vdi", made()
 

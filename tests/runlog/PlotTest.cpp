@@ -44,6 +44,9 @@ TEST_CASE("each stage of each frame is as high as it took long") {
   const std::string mean = plot(records, {"run", true});
   CHECK_THAT(mean, test::ContainsSubstring("380.00h386.75V290.00"));
   CHECK(countOf(mean, ">10</text>") == 1);  // the step
+  CHECK(countOf(mean, "the simulation's wait") == 1);
+  records.starts.push_back({"V", 2, 0, true});
+  CHECK(countOf(plot(records, {"run", true}), "the simulation's wait") == 0);
 }
 
 TEST_CASE("names and errors can't leave their elements") {

@@ -62,7 +62,8 @@ TEST_CASE("a line of JSON keeps a record") {
   summary.add(frame());
   summary.add(failed);
   summary.seconds = 1.0;
-  const runlog::RunStart start{"V", 4, 1700000000};
+  summary.isIsolated = GENERATE(false, true);
+  const runlog::RunStart start{"V", 4, 1700000000, summary.isIsolated};
   const std::string lines =
       jsonLine(start) + "\n" + jsonLine(frame()) + "\n" + jsonLine(failed) + "\n" + jsonLine(summary) + "\n";
   const RunRecords records = parseRecords(lines);
@@ -115,4 +116,11 @@ TEST_CASE("lines to read") {
   FrameRecord failed = frame();
   failed.error = "two\nlines";
   CHECK(textLine(failed) == "step 20, time 0.1: 12.5 ms, failed: two lines");
+  RunSummary summary;
+  summary.waitedSeconds = 1.0;
+  summary.seconds = 4.0;
+  CHECK_THAT(textLine(summary), test::ContainsSubstring("; the simulation waited 1.00 s of 4.00 s (25.0 %)"));
+  summary.isIsolated = true;
+  CHECK_THAT(textLine(summary),
+             test::ContainsSubstring("; frames in processes of their own took 1.00 s of 4.00 s (25.0 %)"));
 }

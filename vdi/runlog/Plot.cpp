@@ -128,7 +128,9 @@ class Picture {
       at += 36.0 + 7.0 * static_cast<double>(names_[i].size());
     }
     out += fmt::format("<path d=\"M{:.0f} 56h11\" stroke=\"#000\" stroke-width=\"1.5\"/>", at);
-    return out + fmt::format("<text x=\"{:.0f}\" y=\"60\">the simulation's wait</text>\n", at + 15.0);
+    const bool isIsolated = !records_.starts.empty() && records_.starts.back().isIsolated;
+    return out + fmt::format("<text x=\"{:.0f}\" y=\"60\">{}</text>\n", at + 15.0,
+                             isIsolated ? "the whole frame" : "the simulation's wait");
   }
 
   std::string stages() const {

@@ -13,8 +13,9 @@ struct PlotOptions {
 };
 
 /// An SVG document: above, each frame's stages on top of each other, in milliseconds, with a line where the
-/// simulation's wait ends; below, the bytes that the frame wrote. Frames stand in the log's order; their
-/// steps are written below them, and failed ones are red. Throws Error{Format} if there are no frames.
+/// simulation's wait, or a frame in another process, ends; below, the bytes that the frame wrote. Frames
+/// stand in the log's order; their steps are written below them, and failed ones are red. Throws
+/// Error{Format} if there are no frames.
 std::string plot(const RunRecords& records, const PlotOptions& options);
 
 }  // namespace vdi::runlog

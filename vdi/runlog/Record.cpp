@@ -60,7 +60,7 @@ std::vector<StageTime> stagesFrom(const Json& object) {
 
 RunStart startFrom(const Json& line) {
   return {line.at("field").get<std::string>(), line.at("ranks").get<int>(),
-          line.at("unix_time").get<std::int64_t>()};
+          line.at("unix_time").get<std::int64_t>(), line.value("isolated", false)};
 }
 
 FrameRecord frameFrom(const Json& line) {
@@ -97,6 +97,7 @@ RunSummary summaryFrom(const Json& line) {
   summary.waitedSeconds = line.at("waited_seconds").get<double>();
   summary.longestMilliseconds = line.at("longest_ms").get<double>();
   summary.stages = stagesFrom(line.at("stages"));
+  summary.isIsolated = line.value("isolated", false);
   return summary;
 }
 
@@ -186,12 +187,11 @@ void RunSummary::add(const FrameRecord& record) {
 }
 
 std::string jsonLine(const RunStart& start) {
-  return JsonObject()
-      .add("event", jsonOf("start"))
-      .add("field", jsonOf(start.field))
-      .add("ranks", jsonOf(start.ranks))
-      .add("unix_time", jsonOf(start.unixTime))
-      .text();
+  JsonObject line;
+  line.add("event", jsonOf("start")).add("field", jsonOf(start.field)).add("ranks", jsonOf(start.ranks));
+  line.add("unix_time", jsonOf(start.unixTime));
+  if (start.isIsolated) line.add("isolated", "true");
+  return line.text();
 }
 
 std::string jsonLine(const FrameRecord& record) {
@@ -222,8 +222,8 @@ std::string jsonLine(const LeftOut& frame) {
 }
 
 std::string jsonLine(const RunSummary& summary) {
-  return JsonObject()
-      .add("event", jsonOf("end"))
+  JsonObject line;
+  line.add("event", jsonOf("end"))
       .add("frames", jsonOf(summary.frames))
       .add("failed", jsonOf(summary.failed))
       .add("left_out", jsonOf(summary.leftOut))
@@ -232,8 +232,9 @@ std::string jsonLine(const RunSummary& summary) {
       .add("seconds", jsonOf(rounded(summary.seconds)))
       .add("waited_seconds", jsonOf(rounded(summary.waitedSeconds)))
       .add("longest_ms", jsonOf(rounded(summary.longestMilliseconds)))
-      .add("stages", stagesJson(summary.stages))
-      .text();
+      .add("stages", stagesJson(summary.stages));
+  if (summary.isIsolated) line.add("isolated", "true");
+  return line.text();
 }
 
 std::string textLine(const RunStart& start) {
@@ -270,8 +271,9 @@ std::string textLine(const RunSummary& summary) {
   if (summary.leftOut > 0) line += fmt::format("{} left out, ", summary.leftOut);
   line +=
       fmt::format("{} dropped by the stream; {} written", summary.dropped, mebibytes(summary.bytesWritten));
-  line += fmt::format("; the simulation waited {:.2f} s of {:.2f} s ({:.1f} %)", summary.waitedSeconds,
-                      summary.seconds, share);
+  line += fmt::format("; {} {:.2f} s of {:.2f} s ({:.1f} %)",
+                      summary.isIsolated ? "frames in processes of their own took" : "the simulation waited",
+                      summary.waitedSeconds, summary.seconds, share);
   if (all > 0) {
     line += fmt::format(", {:.1f} ms a frame, {:.1f} ms at most",
                         summary.waitedSeconds * millisecondsPerSecond / static_cast<double>(all),

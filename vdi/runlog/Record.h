@@ -33,6 +33,7 @@ struct RunStart {
   std::string field;
   int ranks = 1;
   std::int64_t unixTime = 0;  // seconds
+  bool isIsolated = false;    // other processes make the frames; times are theirs, not the simulation's
   bool operator==(const RunStart&) const = default;
 };
 
@@ -40,7 +41,7 @@ struct FrameRecord {
   std::int64_t step = 0;
   double time = 0.0;
   std::string camera;               // empty: the run's only one
-  double milliseconds = 0.0;        // the simulation waited for this frame, as the first rank saw it
+  double milliseconds = 0.0;        // the frame took this long, as the first rank saw it
   std::vector<StageTime> stages;    // of a failed frame: none
   std::uint64_t bytesWritten = 0;   // into files
   std::uint64_t bytesSent = 0;      // between ranks, all of them together
@@ -71,9 +72,10 @@ struct RunSummary {
   std::uint64_t dropped = 0;  // by the stream
   std::uint64_t bytesWritten = 0;
   double seconds = 0.0;              // of the run, from its start
-  double waitedSeconds = 0.0;        // of these, the simulation's wait for frames, failed ones included
+  double waitedSeconds = 0.0;        // of these, those that frames took, failed ones included
   double longestMilliseconds = 0.0;  // of a frame
   std::vector<StageTime> stages;     // sums over frames
+  bool isIsolated = false;           // as in RunStart; if not, the simulation waited for the frames
   bool operator==(const RunSummary&) const = default;
 
   void add(const FrameRecord& record);

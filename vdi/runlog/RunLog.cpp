@@ -73,6 +73,7 @@ RunLog::RunLog(const LogFiles& files, const RunStart& start, Before before) {
   for (Appended* file : {json_.get(), text_.get()}) {
     if (file != nullptr && before == Before::Goes) file->empty();
   }
+  summary_.isIsolated = start.isIsolated;
   append(jsonLine(start), textLine(start));
 }
 

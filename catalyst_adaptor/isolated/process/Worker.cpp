@@ -65,8 +65,7 @@ class Worker {
     const std::int32_t comm = MPI_Comm_c2f(comm_);
     if (setup_.isJson) {
       const char* text = setup_.hasText ? setup_.json.c_str() : nullptr;
-      return setup_.isGoingOn ? vdi_catalyst_go_on_with_json(comm, text, &catalyst_)
-                              : vdi_catalyst_initialize_json(comm, text, &catalyst_);
+      return vdi_catalyst_make_frames_of_json(comm, text, setup_.isGoingOn ? 1 : 0, &catalyst_);
     }
     std::vector<std::vector<const char*>> arguments;
     std::vector<vdi_catalyst_pipeline> pipelines;
