@@ -18,7 +18,8 @@ extern "C" {
  * `make_frames_of_json` is initialize_json in the processes that make an isolated run's frames. If `goes_on`,
  * earlier processes have made a part of the run, whose files stay.
  * `set_clock`, which may be null, sets the time in seconds, since the run's start, that counts as that of the
- * next step. */
+ * next step. `log_left_out`, which may be null, notes in the log, on the first rank, that the simulation
+ * didn't hand over a step, because two earlier frames were still to be made. Both aren't collective. */
 typedef struct vdi_catalyst_functions {
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**);
   int (*initialize_pipelines)(int32_t, int32_t, const vdi_catalyst_pipeline*, vdi_catalyst**);
@@ -37,6 +38,7 @@ typedef struct vdi_catalyst_functions {
   int (*finalize)(vdi_catalyst*);
   const char* (*error)(const vdi_catalyst*);
   void (*set_clock)(vdi_catalyst*, double);
+  void (*log_left_out)(vdi_catalyst*, int64_t, double);
 } vdi_catalyst_functions;
 
 /* An engine's only symbol. Its name contains the version, so a library of another version lacks it. */
@@ -46,11 +48,12 @@ enum { VDI_CATALYST_NOT_ISOLATED = -1 };
 VDI_CATALYST_API extern const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS;
 
 /* libvdi_catalyst.so exports these for the program in which the isolated engine makes frames
- * (isolated/process). They call the entries of these names of the engine for JSON, and set_clock does nothing
- * for other runs. */
+ * (isolated/process). They call the entries of these names of the engine for JSON, and the last two do
+ * nothing for other runs. */
 VDI_CATALYST_API int vdi_catalyst_make_frames_of_json(int32_t fortran_communicator, const char* json,
                                                       int goes_on, vdi_catalyst** catalyst);
 VDI_CATALYST_API void vdi_catalyst_set_clock(vdi_catalyst* catalyst, double seconds);
+VDI_CATALYST_API void vdi_catalyst_log_left_out(vdi_catalyst* catalyst, int64_t step, double time);
 
 #ifdef __cplusplus
 }

@@ -302,6 +302,11 @@ void vdi_catalyst_set_clock(vdi_catalyst* catalyst, double seconds) {
   if (engine != NULL && engine->set_clock != NULL) engine->set_clock(catalyst, seconds);
 }
 
+void vdi_catalyst_log_left_out(vdi_catalyst* catalyst, int64_t step, double time) {
+  const vdi_catalyst_functions* engine = functions_of(catalyst);
+  if (engine != NULL && engine->log_left_out != NULL) engine->log_left_out(catalyst, step, time);
+}
+
 double vdi_catalyst_parameter_f64(vdi_catalyst* catalyst, const char* name, double value, double low,
                                   double high) {
   RETURN_CALL(double, value, parameter_f64(catalyst, name, value, low, high));

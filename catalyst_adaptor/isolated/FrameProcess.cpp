@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <exception>
 #include <new>
 #include <utility>
 
@@ -175,6 +176,21 @@ void FrameProcess::reserve(const StepWriter& data) {
   buffer = SharedPages();  // first, because two might find no room
   areKnown_[next] = false;
   buffer = SharedPages(data.bytes());
+}
+
+bool FrameProcess::tellLeftOut(const LeftOutSteps& steps) noexcept {
+  SharedPages pages;
+  try {
+    Packer packer;
+    steps.pack(packer);
+    pages = SharedPages(packer.bytes().size());
+    std::memcpy(pages.bytes().data(), packer.bytes().data(), packer.bytes().size());
+  } catch (const std::exception&) {
+    return false;
+  }
+  const std::array<int, 1> descriptors{pages.descriptor()};
+  tell([](Packer& message) { message.put(Say::LeftOut); }, descriptors);
+  return true;
 }
 
 void FrameProcess::handOver(const StepWriter& data, StepNotice notice) noexcept {

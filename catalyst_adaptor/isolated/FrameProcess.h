@@ -53,6 +53,8 @@ class FrameProcess {
   DoneNotice takeDone();
   /// Makes room for a step's data in the next buffer, of two, which no step uses. Throws std::runtime_error.
   void reserve(const StepWriter& data);
+  /// Tells which steps aren't handed over. Returns false if there is no memory to share them by.
+  bool tellLeftOut(const LeftOutSteps& steps) noexcept;
   /// Hands a step over, by the buffer in which there is room.
   void handOver(const StepWriter& data, StepNotice notice) noexcept;
 

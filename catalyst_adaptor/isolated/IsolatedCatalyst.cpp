@@ -237,4 +237,5 @@ const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
     finalize,
     Entries::error,
     nullptr,
+    nullptr,
 };

@@ -325,10 +325,10 @@ int IsolatedRun::handOver(std::int64_t step, double time, double now) {
     if (code != VDI_CATALYST_OK) return code;
   }
   if (handedOver_ - settled_ >= 2) {
-    if (tiredAt_ == settled_) return leaveOut(step);
+    if (tiredAt_ == settled_) return leaveOut(step, time);
     const double patience =
         isSteered() ? std::numeric_limits<double>::infinity() : options_.isolation.patience;
-    if (patience == 0.0) return leaveOut(step);
+    if (patience == 0.0) return leaveOut(step, time);
     const auto [result, done] = wait([&] { return process_->doneCount(); }, handedOver_ - 1, patience);
     if (result == Wait::Dead) {
       const int code = bury(step);
@@ -337,7 +337,7 @@ int IsolatedRun::handOver(std::int64_t step, double time, double now) {
     earlier = settle(done, At{step, time});
     if (result == Wait::Tired) {
       tiredAt_ = settled_;
-      return leaveOut(step);
+      return leaveOut(step, time);
     }
   }
   // Scripts may use all fields. Where a rank lacks a named one, too, all ranks hand over all: their processes
@@ -360,14 +360,21 @@ int IsolatedRun::handOver(std::int64_t step, double time, double now) {
   notice.step = step;
   notice.time = time;
   notice.clock = now;
+  tellLeftOut();
   process_->handOver(*data, notice);
   ++handedOver_;
   return earlier;
 }
 
 /// A step for which there is no buffer. Without patience, that is as the run wants it.
-int IsolatedRun::leaveOut(std::int64_t step) {
+int IsolatedRun::leaveOut(std::int64_t step, double time) {
   ++leftOut_;
+  // Where viewers may steer, not every step that isn't handed over would have had a frame.
+  const bool isLogged = rank_ == 0 && options_.run && options_.run->log.any() && !isSteered();
+  try {
+    if (isLogged) untold_.steps.push_back({step, time});
+  } catch (const std::bad_alloc&) {  // the log lacks the step
+  }
   if (options_.isolation.patience == 0.0) {
     if (!std::exchange(hasToldOfLeftOut_, true) && rank_ == 0) {
       std::fprintf(stderr,
@@ -386,6 +393,11 @@ int IsolatedRun::leaveOut(std::int64_t step) {
         return "";
       },
       step);
+}
+
+/// Tells the process about the steps that were left out since the last ones of which it knows.
+void IsolatedRun::tellLeftOut() {
+  if (!untold_.steps.empty() && process_->tellLeftOut(untold_)) untold_.steps.clear();
 }
 
 /// Whether this rank has the fields that a JSON run names.
@@ -419,6 +431,7 @@ int IsolatedRun::finish() {
                  static_cast<long long>(leftOut_));
   }
   if (!process_) return VDI_CATALYST_ENGINE;
+  tellLeftOut();
   process_->finish();
   // A viewer may pause a steered run for any time.
   const double limit = isSteered() ? std::numeric_limits<double>::infinity()

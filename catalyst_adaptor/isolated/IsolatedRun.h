@@ -73,7 +73,8 @@ class IsolatedRun {
   bool isLocallyWanted(std::int64_t step, double time, double now) const;
   int checked(std::int64_t step);
   int handOver(std::int64_t step, double time, double now);
-  int leaveOut(std::int64_t step);
+  int leaveOut(std::int64_t step, double time);
+  void tellLeftOut();
   bool hasNamedFields() const;
   StepFields fieldsOf(bool namedAlone) const;
   Setup setupOf(bool isGoingOn) const;
@@ -93,6 +94,7 @@ class IsolatedRun {
   std::int64_t settled_ = 0;               // of them, those whose results all ranks know
   std::optional<std::int64_t> tiredAt_;    // `settled_` when a wait was given up
   std::int64_t leftOut_ = 0;
+  LeftOutSteps untold_;  // the first rank's: steps left out that the process doesn't know of yet, for its log
   bool hasToldOfLeftOut_ = false;
 };
 

@@ -43,6 +43,18 @@ Setup Setup::unpack(Unpacker& unpacker) {
   return setup;
 }
 
+void LeftOutSteps::pack(Packer& packer) const {
+  packer.put(std::uint64_t{steps.size()});
+  for (const Step& step : steps) packer.put(step);
+}
+
+LeftOutSteps LeftOutSteps::unpack(Unpacker& unpacker) {
+  LeftOutSteps all;
+  for (auto count = unpacker.take<std::uint64_t>(); count > 0; --count)
+    all.steps.push_back(unpacker.take<Step>());
+  return all;
+}
+
 bool isOfMpiJob(std::string_view variable) {
   const auto startsWithAny = [&](const auto& prefixes) {
     return std::ranges::any_of(prefixes,

@@ -13,10 +13,11 @@ namespace vdi::catalyst {
 /// The first word of each message.
 enum class Say : std::uint32_t {
   // From the simulation.
-  Hello,   // with stdout, stderr and the Setup's pages as descriptors
-  Step,    // see StepNotice; with the buffer's pages as descriptor if they are new
-  Ask,     // int64 first: which steps from there on will be wanted?
-  Finish,  // end the run
+  Hello,    // with stdout, stderr and the Setup's pages as descriptors
+  LeftOut,  // steps that aren't handed over, for the log; with the pages of LeftOutSteps as descriptor
+  Step,     // see StepNotice; with the buffer's pages as descriptor if they are new
+  Ask,      // int64 first: which steps from there on will be wanted?
+  Finish,   // end the run
   // From the process.
   Worker,    // int32 process: the worker's number, from its supervisor
   Started,   // int32 code: initialising has ended
@@ -53,6 +54,18 @@ struct StepNotice {
   double clock = 0.0;        // seconds since the run's start
   std::uint32_t buffer = 0;  // 0 or 1
   bool isNewBuffer = false;  // its pages come with this message
+};
+
+/// Steps at which a frame was due, and which were left out, for want of a buffer.
+struct LeftOutSteps {
+  struct Step {
+    std::int64_t step = 0;
+    double time = 0.0;
+  };
+  std::vector<Step> steps;
+
+  void pack(Packer& packer) const;
+  static LeftOutSteps unpack(Unpacker& unpacker);
 };
 
 struct DoneNotice {

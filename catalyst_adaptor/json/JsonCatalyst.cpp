@@ -140,6 +140,10 @@ void setClock(vdi_catalyst* catalyst, double seconds) {
   if (usable(catalyst)) catalyst->engine->setClock(seconds);
 }
 
+void logLeftOut(vdi_catalyst* catalyst, int64_t step, double time) {
+  if (usable(catalyst)) catalyst->engine->logLeftOut(step, time);
+}
+
 int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   return vdi::catalyst::setBlocks(*catalyst, count, blocks);
@@ -211,4 +215,5 @@ const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
     finalize,
     Entries::error,
     setClock,
+    logLeftOut,
 };

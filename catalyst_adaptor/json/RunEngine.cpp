@@ -239,6 +239,15 @@ void RunEngine::leaveOut(std::int64_t step, double time) {
   });
 }
 
+void RunEngine::logLeftOut(std::int64_t step, double time) noexcept {
+  if (!state_->log) return;
+  try {
+    state_->log->add(runlog::LeftOut{step, time, "two earlier frames were still to be made"});
+  } catch (const std::exception& error) {  // the other ranks don't know of it, and no step fails
+    std::fprintf(stderr, "vdi_catalyst: step %lld: %s\n", static_cast<long long>(step), error.what());
+  }
+}
+
 void RunEngine::execute(Fields& fields, Parameters& parameters, std::int64_t step, double time,
                         double waited) {
   State& state = *state_;

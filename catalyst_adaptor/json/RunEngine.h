@@ -47,6 +47,8 @@ class RunEngine {
   /// Sets the clock by which the schedule decides on the next step, in seconds since the run's start, instead
   /// of this process's own. Not collective; the first rank's counts.
   void setClock(double seconds);
+  /// Logs a step at which a frame was due, and which the simulation didn't hand over. Not collective.
+  void logLeftOut(std::int64_t step, double time) noexcept;
   /// Ends the log. No frames may follow.
   void finish();
 

@@ -232,4 +232,5 @@ const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
     finalize,
     Entries::error,
     nullptr,
+    nullptr,
 };

@@ -12,6 +12,7 @@
 
 #include "catalyst_adaptor/Fields.h"
 #include "catalyst_adaptor/ParticleArray.h"
+#include "catalyst_adaptor/isolated/Messages.h"
 #include "tests/Catch.h"
 
 using namespace vdi::catalyst;
@@ -135,6 +136,16 @@ TEST_CASE("no particles, and no blocks, arrive as none") {
   REQUIRE(got.particles.size() == 1);
   CHECK(got.particles[0].given.count == 0);
   CHECK_NOTHROW(particleArrayOf(&got.particles[0].given));
+}
+
+TEST_CASE("steps that are left out arrive with their times") {
+  Packer packer;
+  LeftOutSteps{{{3, 0.5}, {std::int64_t{1} << 40, -1.0}}}.pack(packer);
+  Unpacker unpacker(packer.bytes());
+  const LeftOutSteps got = LeftOutSteps::unpack(unpacker);
+  REQUIRE(got.steps.size() == 2);
+  CHECK((got.steps[0].step == 3 && got.steps[0].time == 0.5));
+  CHECK((got.steps[1].step == std::int64_t{1} << 40 && got.steps[1].time == -1.0));
 }
 
 TEST_CASE("a step that is cut short is refused") {

@@ -164,12 +164,17 @@ def slow():
 
 def impatient():
     """Without patience, no step waits: frames are left out, and all others are there."""
-    run = Run({"isolation": {"patience": 0}, "resolution": [400, 300]}, 30)
+    run = Run({"isolation": {"patience": 0}, "resolution": [400, 300], "log": "run.jsonl"}, 30)
     assert set(run.codes) == {0} and run.end == 0, run.codes
     told = [re.search(r"(\d+) steps were left out", line) for line in run.lines]
     left_out = sum(int(found.group(1)) for found in told if found)
     assert len(made()) + left_out == 30 and left_out > 0, (len(made()), left_out)
     assert "left out: two earlier" in run.lines[0], run.lines
+    records = [json.loads(line) for line in open("run.jsonl")]
+    steps = {event: [record["step"] for record in records if record["event"] == event] for event in ("frame", "left_out")}
+    assert len(steps["left_out"]) == left_out and sorted(steps["frame"] + steps["left_out"]) == list(range(30)), steps
+    assert all(record["cause"].startswith("two earlier") for record in records if record["event"] == "left_out"), records
+    assert records[-1]["event"] == "end" and records[-1]["left_out"] == left_out, records[-1]
 
 
 def no_room():

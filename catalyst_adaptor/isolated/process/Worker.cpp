@@ -45,6 +45,9 @@ class Worker {
       if (received.result == Socket::Result::Nothing) continue;
       Unpacker message(received.message);
       switch (message.take<Say>()) {
+        case Say::LeftOut:
+          logLeftOut(received);
+          break;
         case Say::Step:
           step(message.take<StepNotice>(), received);
           break;
@@ -76,6 +79,13 @@ class Worker {
     }
     return vdi_catalyst_initialize_pipelines(comm, static_cast<std::int32_t>(pipelines.size()),
                                              pipelines.data(), &catalyst_);
+  }
+
+  void logLeftOut(Socket::Received& received) {
+    const SharedPages pages(std::move(received.descriptors.at(0)));
+    Unpacker unpacker(pages.bytes());
+    for (const LeftOutSteps::Step& one : LeftOutSteps::unpack(unpacker).steps)
+      vdi_catalyst_log_left_out(catalyst_, one.step, one.time);
   }
 
   void step(const StepNotice& notice, Socket::Received& received) {
