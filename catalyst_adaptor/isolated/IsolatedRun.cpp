@@ -366,6 +366,12 @@ int IsolatedRun::handOver(std::int64_t step, double time, double now) {
   return earlier;
 }
 
+/// Collective: whether a rank's answer is yes. One rank's stopped process keeps the others' from their
+/// frames, so it alone is the cause to tell.
+bool IsolatedRun::isOfAny(bool answer) const {
+  return meet<1>(self_.comm, {answer ? 1 : 0})[0] != 0;
+}
+
 /// A step for which there is no buffer. Without patience, that is as the run wants it.
 int IsolatedRun::leaveOut(std::int64_t step, double time) {
   ++leftOut_;
@@ -384,11 +390,13 @@ int IsolatedRun::leaveOut(std::int64_t step, double time) {
     }
     return VDI_CATALYST_OK;
   }
+  const bool isStopped = process_->isStopped();
+  const bool isAnyStopped = isOfAny(isStopped);
   return guarded(
       self_, VDI_CATALYST_SCRIPT,
       [&]() -> std::optional<std::string> {
-        if (process_->isStopped()) return "left out: somebody has stopped the process that makes frames";
-        if (process_->doneCount() == settled_)
+        if (isStopped) return "left out: somebody has stopped the process that makes frames";
+        if (!isAnyStopped && process_->doneCount() == settled_)
           return "left out: the process that makes frames has made none for long";
         return "";
       },
@@ -440,9 +448,11 @@ int IsolatedRun::finish() {
   const Wait result = wait(progress, handedOver_ + 1, limit).first;
   if (result == Wait::Dead) return bury(std::nullopt);
   if (result == Wait::Tired) {
+    const bool isStopped = process_->isStopped();
+    const bool isAnyStopped = isOfAny(isStopped);
     const int code = guarded(self_, VDI_CATALYST_ENGINE, [&]() -> std::optional<std::string> {
-      if (process_->isStopped()) return "somebody has stopped the process that makes frames; it is killed";
-      if (process_->finished()) return "";
+      if (isStopped) return "somebody has stopped the process that makes frames; it is killed";
+      if (isAnyStopped || process_->finished()) return "";
       return "the process that makes frames doesn't end the run; it is killed";
     });
     end();

@@ -73,6 +73,7 @@ class IsolatedRun {
   bool isLocallyWanted(std::int64_t step, double time, double now) const;
   int checked(std::int64_t step);
   int handOver(std::int64_t step, double time, double now);
+  bool isOfAny(bool answer) const;
   int leaveOut(std::int64_t step, double time);
   void tellLeftOut();
   bool hasNamedFields() const;

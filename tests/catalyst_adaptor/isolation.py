@@ -139,15 +139,16 @@ def restart():
 
 
 def stopped():
-    """Steps are left out while it is stopped, and the simulation goes on."""
-    run = Run({}, 10, **dying("writing", "stop", rank=0))
-    assert SCRIPT in run.codes and "left out: somebody has stopped the process" in run.lines[0], run.lines
-    first = run.codes.index(SCRIPT)
-    assert all(code == SCRIPT for code in run.codes[first:]), run.codes
-    assert all("again, rank 0: left out" in line for line in run.lines[1:-2]), run.lines
-    assert "in all, %d steps were left out" % (10 - first) in run.lines[-2], run.lines
-    assert run.end == ENGINE and "it is killed" in run.lines[-1], run.lines
-    assert run.seconds < 60
+    """Steps are left out while it is stopped, and the simulation goes on. The cause is told, whichever rank's it is."""
+    for stage, rank in (("writing", 0), ("taking", LAST)):
+        run = Run({"output": stage + "_{timestep}.vdi"}, 10, **dying(stage, "stop", rank=rank))
+        first = run.codes.index(SCRIPT)
+        assert "rank %d: left out: somebody has stopped the process" % rank in run.lines[0], run.lines
+        assert all(code == SCRIPT for code in run.codes[first:]), run.codes
+        assert all("again, rank %d: left out: somebody has" % rank in line for line in run.lines[1:-2]), run.lines
+        assert "in all, %d steps were left out" % (10 - first) in run.lines[-2], run.lines
+        assert run.end == ENGINE and "rank %d: somebody has stopped" % rank in run.lines[-1], run.lines
+        assert "it is killed" in run.lines[-1] and run.seconds < 60, run.lines
 
 
 def slow():
