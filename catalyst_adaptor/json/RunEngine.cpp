@@ -132,9 +132,10 @@ struct RunEngine::State {
   std::unique_ptr<LiveStream> stream;       // the root's
   std::unique_ptr<io::CinemaIndex> cinema;  // the root's
   std::optional<RunSteering> steering;
-  std::optional<ScalarRange> firstRange;  // the colours' range, unless the run has one
-  std::optional<LoadedFrame> frame;       // the frame whose values the device has
-  bool isAskedFor = false;                // a viewer waits for a view, which the next step shows
+  std::optional<ScalarRange> firstRange;    // the colours' range, unless the run has one
+  std::optional<double> firstUnitDistance;  // the opacities', unless the run has one
+  std::optional<LoadedFrame> frame;         // the frame whose values the device has
+  bool isAskedFor = false;                  // a viewer waits for a view, which the next step shows
   bool hasToldOfBudget = false;
   std::optional<double> clock;  // the schedule's time in seconds, given for the next step
 };
@@ -434,7 +435,10 @@ void RunEngine::prepare(Fields& fields, std::int64_t step, double time) {
   frame.step = step;
   frame.time = time;
   frame.range = state.firstRange.value_or(range);
-  frame.unitDistance = unitDistanceOf(generator.scene().bounds, voxelVolume);
+  // It stays the same, or opacities would jump where levels of refinement come and go.
+  const double unitDistance = unitDistanceOf(generator.scene().bounds, voxelVolume);
+  if (!state.firstUnitDistance && voxelVolume > 0.0) state.firstUnitDistance = unitDistance;
+  frame.unitDistance = state.firstUnitDistance.value_or(unitDistance);
   comm.together([&] {
     frame.stamp = {time,
                    static_cast<std::uint64_t>(step),

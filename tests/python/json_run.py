@@ -88,6 +88,20 @@ def check_kept():
         assert cells() is None and others() is not None
 
 
+def check_levels():
+    """Opacities hold over the same distance where a level of refinement comes and goes."""
+    with Catalyst(MPI.COMM_WORLD, json={"field": "V", "resolution": [48, 32], "output": "levels_{timestep}.vdi"}) as catalyst:
+        for step in range(3):
+            blocks = [Block(cells=(N, N, N), spacing=(1 / N,) * 3)]
+            if step == 1:
+                blocks.append(Block(cells=(N, N, N), origin=(0.25,) * 3, spacing=(0.5 / N,) * 3))
+            catalyst.set_blocks(blocks)
+            catalyst.set_array("V", [np.linspace(0, 1, N ** 3).reshape(N, N, N) for _ in blocks])
+            catalyst.execute(step)
+    distances = {pv_vdi.read("levels_%d.vdi" % step).metadata["transferFunction"]["unitDistance"] for step in range(3)}
+    assert len(distances) == 1, distances
+
+
 refused(SCRIPT, json={"field": "V", "evry": 10})
 refused(SCRIPT, json="none.json")
 run = {"field": "V", "every": 10, "resolution": [48, 32], "stream": {"link_file": "link"},
@@ -126,6 +140,7 @@ with Catalyst(MPI.COMM_WORLD, json={"field": "V"}) as catalyst:
     catalyst.set_blocks([])
     assert catalyst.wants(1)
 check_kept()
+check_levels()
 
 # Particles: one array or three, of any stride, weights and lengths for each or for all.
 places = np.random.default_rng(3).uniform(0.2, 0.8, (2000, 3))

@@ -27,7 +27,7 @@ struct RunColors {
   std::optional<ScalarRange> range;  // none: the range of the first frame's values
   // x are values of the field; empty: the preset's, or a ramp from 0 to 1
   std::vector<OpacityNode> opacities;
-  std::optional<double> unitDistance;  // world units; none: unitDistanceOf
+  std::optional<double> unitDistance;  // world units; none: unitDistanceOf the first frame
 };
 
 /// An orbit around the bounds of the field's blocks.
