@@ -9,9 +9,10 @@ RANGE = [0.2, 1.0]
 grid = TrivialProducer(registrationName="grid")
 image = VolumetricDepthImage(Input=grid)
 image.SelectInputScalars = ["CELLS", os.environ.get("VDI_TEST_FIELD", "V")]
+ImportPresets(os.path.join(os.path.dirname(os.path.abspath(__file__)), "json_preset.json"))
 colors = GetColorTransferFunction("V")
-colors.ColorSpace = "RGB"
-colors.RGBPoints = [RANGE[0], 0.1, 0.2, 0.8, 0.6, 0.9, 0.9, 0.9, RANGE[1], 0.8, 0.1, 0.1]
+colors.ApplyPreset("blue to red")
+colors.RescaleTransferFunction(*RANGE)
 opacities = GetOpacityTransferFunction("V")
 opacities.Points = [RANGE[0], 0.0, 0.5, 0.0, 0.5, 0.1, 0.5, 0.0, RANGE[1], 0.9, 0.5, 0.0]
 image.LookupTable = colors

@@ -61,6 +61,13 @@ TEST_CASE("a map is moved to a range, its opacities with it") {
   const config::ColorMap map = config::rescaled(config::colorMapOf(text, "a.json", "a"), {10.0, 20.0});
   CHECK(map.colors == std::vector<ColorNode>{{10.0, glm::dvec3(0.0)}, {20.0, glm::dvec3(1.0)}});
   CHECK(map.opacities == std::vector<OpacityNode>{{10.0, 0.0}, {20.0, 0.5}});
+  // RescaleTransferFunction of ParaView 5.11 puts the node at this double, and the last one at the range's
+  // end.
+  const std::string inner = R"({"Name": "a", "RGBPoints": [0, 0, 0, 0, 0.7, 0, 0, 0, 1, 1, 1, 1]})";
+  const config::ColorMap moved = config::rescaled(config::colorMapOf(inner, "a.json", "a"), {-0.3, 1.0});
+  REQUIRE(moved.colors.size() == 3);
+  CHECK(moved.colors[1].x == 0.6099999999999999);
+  CHECK(moved.colors[2].x == 1.0);
 }
 
 TEST_CASE("what isn't a preset is refused with its place") {

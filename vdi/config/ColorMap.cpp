@@ -218,12 +218,14 @@ ColorMap readPreset(const JsonValue& preset) {
   return map;
 }
 
+/// Moves nodes as ParaView does, to the last bit: files are to equal those of a script.
 template <typename Node>
 void rescale(std::vector<Node>& nodes, double low, double high, const ScalarRange& range) {
   for (Node& node : nodes) {
     const double share = (node.x - low) / (high - low);
-    node.x = range.min * (1.0 - share) + range.max * share;
+    node.x = std::min(range.min + (range.max - range.min) * share, range.max);
   }
+  nodes.back().x = range.max;
 }
 
 }  // namespace
