@@ -141,6 +141,10 @@ void checkOffset(const char* name, std::int32_t association, const double* offse
     require(std::abs(offset[axis]) <= 0.5, "an array's offset must be at most half a cell");  // false for NaN
 }
 
+void requireTime(double time) {
+  require(std::isfinite(time), "the time isn't a finite number");
+}
+
 bool isStep(std::int64_t step) {
   return step >= 0 && step <= std::numeric_limits<int>::max();
 }

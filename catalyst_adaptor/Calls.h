@@ -102,6 +102,8 @@ void checkBlocks(std::int32_t count, const vdi_catalyst_block* blocks);
 std::unique_ptr<unsigned char[]> newMarks(const vdi_catalyst_block& block);
 /// Throws std::invalid_argument with the reason if an array can't have the name, association or offset.
 void checkOffset(const char* name, std::int32_t association, const double* offset);
+/// Throws std::invalid_argument with the reason unless the time of a step is finite: files hold no other.
+void requireTime(double time);
 /// Whether ParaView can count this step.
 bool isStep(std::int64_t step);
 /// Throws std::invalid_argument with the reason unless the step fits ParaView's int, by which it counts steps

@@ -68,7 +68,7 @@ enum {
   VDI_CATALYST_OK = 0,
   VDI_CATALYST_BAD_ARGUMENT = 1, /* a null pointer or a finalized handle, a size below 1 or too large to
                                   * count, an unknown type, arrays before blocks, an offset beyond half a
-                                  * cell, a step that is no int */
+                                  * cell, a step that is no int, a time that isn't finite */
   VDI_CATALYST_ENGINE = 2, /* ParaView can't be loaded or started, or was started before in this process; the
                             * processes that make the frames can't be started, or have died */
   VDI_CATALYST_SCRIPT = 3  /* a script, or a filter or extractor in it, failed; the others went on */
@@ -264,7 +264,7 @@ VDI_CATALYST_API int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, do
 
 /* Runs the scripts on the blocks as they are now. `step` is the same on all ranks, from 0 to INT32_MAX,
  * because ParaView counts and names files by such numbers. Other steps are VDI_CATALYST_BAD_ARGUMENT each
- * time. */
+ * time, and so are times that aren't finite. */
 VDI_CATALYST_API int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time);
 
 /* A number that viewers may change while the simulation runs, if a script lets them (VDIStream's Steer) or a

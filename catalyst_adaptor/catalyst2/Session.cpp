@@ -163,6 +163,7 @@ int Session::execute(const Node& params) {
     const Node state = params.at("catalyst/state");
     step = stepOf(state);
     time = state.at("time").number();
+    if (!std::isfinite(time)) state.at("time").refuse("isn't a finite number");
   });
   if (code == VDI_CATALYST_OK) {
     code = guarded(calls_, VDI_CATALYST_BAD_ARGUMENT,

@@ -271,8 +271,8 @@ bool IsolatedRun::wants(std::int64_t step, double time) {
   return meet<1>(self_.comm, {*process_->wants(step) ? 1 : 0})[0] != 0;
 }
 
-/// Refuses steps that the engines refuse, and steps that differ.
-int IsolatedRun::checked(std::int64_t step) {
+/// Refuses steps and times that the engines refuse, and steps that differ.
+int IsolatedRun::checked(std::int64_t step, double time) {
   int code = guarded(
       self_, VDI_CATALYST_BAD_ARGUMENT,
       [&] {
@@ -282,6 +282,7 @@ int IsolatedRun::checked(std::int64_t step) {
         } else {
           requireStep(step);
         }
+        requireTime(time);
       },
       step);
   if (code == VDI_CATALYST_OK) {
@@ -296,12 +297,12 @@ int IsolatedRun::execute(std::int64_t step, double time) {
   if (!process_ && !options_.isolation.restart) return VDI_CATALYST_ENGINE;
   if (process_) process_->listen(Milliseconds(0));
   const double now = elapsed();
-  const bool isRefused = !self_.haveBlocks || (schedule_ ? step < 0 : !isStep(step));
+  const bool isRefused = !self_.haveBlocks || !std::isfinite(time) || (schedule_ ? step < 0 : !isStep(step));
   const bool isGone = process_ && process_->isGone();
   const auto [refused, highest, lowest, gone, behind, wanted] = meet<6>(
       self_.comm, {isRefused ? 1 : 0, step, ~step, isGone ? 1 : 0, process_ ? -process_->doneCount() : 0,
                    !isRefused && isLocallyWanted(step, time, now) ? 1 : 0});
-  if (refused != 0 || highest != ~lowest) return checked(step);
+  if (refused != 0 || highest != ~lowest) return checked(step, time);
   int code = VDI_CATALYST_OK;
   if (gone != 0) {
     code = bury(step);

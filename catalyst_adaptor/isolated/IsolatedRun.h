@@ -71,7 +71,7 @@ class IsolatedRun {
   template <typename Progress>
   std::pair<Wait, std::int64_t> wait(Progress progress, std::int64_t goal, double limit);
   bool isLocallyWanted(std::int64_t step, double time, double now) const;
-  int checked(std::int64_t step);
+  int checked(std::int64_t step, double time);
   int handOver(std::int64_t step, double time, double now);
   bool isOfAny(bool answer) const;
   int leaveOut(std::int64_t step, double time);

@@ -164,6 +164,7 @@ int execute(vdi_catalyst* catalyst, int64_t step, double time) {
       [&] {
         require(catalyst->haveBlocks, "no blocks were given yet");
         require(step >= 0, "steps count from 0");
+        vdi::catalyst::requireTime(time);
       },
       step);
   if (code == VDI_CATALYST_OK) {

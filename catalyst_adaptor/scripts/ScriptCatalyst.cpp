@@ -174,6 +174,7 @@ int execute(vdi_catalyst* catalyst, int64_t step, double time) {
       [&] {
         require(catalyst->haveBlocks, "no blocks were given yet");
         vdi::catalyst::requireStep(step);
+        vdi::catalyst::requireTime(time);
       },
       step);
   if (code == VDI_CATALYST_OK) {

@@ -422,6 +422,8 @@ void runBad(const std::string& run) {
   refuse("a channel of particles", 0,
          [](Node& catalyst, Node&) { catalyst["channels/grid/type"].set(std::string("particles")); });
   refuse("no time", 0, [](Node& catalyst, Node&) { catalyst["state/time"].set(std::string("now")); });
+  refuse("a time that is no number", last,
+         [](Node& catalyst, Node&) { catalyst["state/time"].set(std::nan("")); });
   refuse("different steps", last, [](Node& catalyst, Node&) { catalyst["state/timestep"].set(77); });
   Node below = stepNode(layout, -1);
   expect("a step below 0", 100, execute(below));

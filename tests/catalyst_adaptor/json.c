@@ -8,6 +8,7 @@
  * VDI_TEST_OWN_TIMES=1: each rank gives a step another time. VDI_TEST_PAUSE: milliseconds between steps.
  * VDI_TEST_LIMIT: the bytes beyond which no file can grow while the second step is executed. VDI_ISOLATION:
  * frames are made in processes of their own. */
+#include <math.h>
 #include <mpi.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -160,6 +161,12 @@ int main(int argc, char** argv) {
   wrong += expect(rank, "a step before the first is wanted", 0, vdi_catalyst_wants(catalyst, -1, 0.0));
   wrong += expect(rank, "a step before the first", VDI_CATALYST_BAD_ARGUMENT,
                   vdi_catalyst_execute(catalyst, -1, 0.0));
+  wrong += expect(rank, "a time that is no number", VDI_CATALYST_BAD_ARGUMENT,
+                  vdi_catalyst_execute(catalyst, 0, (double)NAN));
+  wrong += expect(rank, "a time that isn't finite on one rank", VDI_CATALYST_BAD_ARGUMENT,
+                  vdi_catalyst_execute(catalyst, 0, rank == ranks - 1 ? (double)INFINITY : 0.0));
+  wrong += expect(rank, "its text", 1,
+                  strstr(vdi_catalyst_error(catalyst), "the time isn't a finite number") != NULL);
   wrong += expect_end(rank, vdi_catalyst_finalize(catalyst));
   wrong += expect(rank, "a second finalize", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_finalize(catalyst));
   wrong += expect(rank, "a step is wanted after it", 0, vdi_catalyst_wants(catalyst, 0, 0.0));

@@ -259,7 +259,8 @@ class Catalyst:
         return self._library.vdi_catalyst_wants(self._handle, step, time) != 0
 
     def execute(self, step, time=0.0):
-        """Makes what the scripts or the JSON ask for, of the blocks as they are now. `step` is the same on all ranks."""
+        """Makes what the scripts or the JSON ask for, of the blocks as they are now. `step` is the same on all ranks, and
+        `time` is finite."""
         self._check(self._library.vdi_catalyst_execute(self._handle, step, time))
 
     def parameter(self, name, value, low, high):
