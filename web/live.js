@@ -50,6 +50,8 @@ const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 10000;
 const ANSWER_MS = 10000;       // time for a server to answer
 const RATE_MS = 4000;          // the rate is a mean over this time
+const SILENT_PULSES = 3;       // a server that has missed so many is gone
+const GRACE_MS = 1000;         // a page that was asleep may run timers before it gets the messages that have come
 const WRONG_TOKEN = 4401;
 const OTHER_VERSION = 4409;
 
@@ -108,6 +110,9 @@ export class Live {
     this.isDecoding = false;
     this.failures = 0;
     this.retryAt = 0;
+    /** The longest silence of a server that is there, in milliseconds; 0: the server promises nothing. */
+    this.patience = 0;
+    this.heardAt = 0;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.timer = undefined;
   }
@@ -204,8 +209,21 @@ export class Live {
     this.change("lost", cause);
   }
 
+  /**
+   * Notices a server that is silent for too long. No event reports a line that was cut in the
+   * middle: a laptop that slept, or a tunnel that hangs.
+   * @param {boolean} [isLast] whether this is the second look, after messages had time to come in
+   */
+  watch(isLast = false) {
+    const silence = performance.now() - this.heardAt;
+    if (silence < this.patience) this.timer = setTimeout(() => this.watch(), this.patience - silence);
+    else if (isLast) this.lose("the server doesn't answer");
+    else this.timer = setTimeout(() => this.watch(true), Math.min(GRACE_MS, this.patience));
+  }
+
   /** @param {string | ArrayBuffer} data */
   receive(data) {
+    this.heardAt = performance.now();
     try {
       if (typeof data === "string") this.takeText(data);
       else this.takePart(data);
@@ -267,6 +285,8 @@ export class Live {
     this.change("waiting", "");
     this.askForWanted();
     this.pauseServer();
+    this.patience = 1000 * SILENT_PULSES * welcome.pulse;
+    if (this.patience > 0) this.watch();
   }
 
   askForWanted() {

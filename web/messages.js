@@ -36,7 +36,8 @@ function refuse(what) {
 
 /**
  * @typedef {{type: "welcome", version: number, session: string, series: Series | null,
- *            viewers: number, steer: boolean}} Welcome
+ *            viewers: number, steer: boolean, pulse: number}} Welcome `pulse`: the server lets no more
+ *     than so many seconds pass without a message; 0: no such promise
  * @typedef {{type: "series", from: number} & Series} SeriesPart a series' further frames, beginning
  *     at `from`
  * @typedef {{type: "error", cause: string}} Refusal
@@ -72,6 +73,7 @@ const MOST_SUPERSEGMENTS = 1024; // in a list, maxSupersegments of vdi/core/Budg
 const MOST_ENTRIES = 64;         // parameters or presets
 const PART_HEADER_BYTES = 16;
 const FIRST_ROOM = 1 << 20;
+const LONGEST_PULSE = 3600;      // seconds
 
 /** @param {unknown} value @param {number} least @param {number} most */
 function isWhole(value, least, most) {
@@ -99,6 +101,13 @@ function numberOrNull(value, name) {
 /** @param {unknown} value @returns {number} 0 if it is missing */
 function viewersOf(value) {
   return isWhole(value, 0, 1e9) ? Number(value) : 0;
+}
+
+/** @param {unknown} value @returns {number} seconds; 0 if it is missing */
+function pulseOf(value) {
+  const pulse = numberOrNull(value, "a pulse") ?? 0;
+  if (pulse < 0 || pulse > LONGEST_PULSE) refuse(`a pulse of ${pulse} s`);
+  return pulse;
 }
 
 /** @param {any} json @returns {Series} */
@@ -188,7 +197,7 @@ export function serverMessageOf(text) {
     case "welcome":
       if (!isWhole(json.version, 0, 0xffffffff)) refuse("a welcome without a version");
       return {type: "welcome", version: json.version, session: textOf(json.session, 200), viewers: viewersOf(json.viewers),
-              series: json.series ? seriesOf(json.series) : null, steer: json.steer === true};
+              series: json.series ? seriesOf(json.series) : null, steer: json.steer === true, pulse: pulseOf(json.pulse)};
     case "series":
       return {type: "series", from: Number(json.from), ...seriesOf(json)};
     case "error":

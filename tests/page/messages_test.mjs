@@ -57,6 +57,7 @@ function testTexts() {
   const series = serverMessageOf(JSON.stringify(welcome));
   check(series.type === "welcome" && series.series?.times[1] === null && series.series.steps.length === 3, "a welcome with a series");
   check(serverMessageOf(JSON.stringify({...welcome, series: null})).series === null, "a welcome without a series");
+  check(series.pulse === 0 && serverMessageOf(JSON.stringify({...welcome, pulse: 15})).pulse === 15, "a server's pulse");
   check(serverMessageOf('{"type":"driver","you":true}').type === "other", "a kind that the page has no use for");
   const told = serverMessageOf(JSON.stringify(steering));
   check(JSON.stringify(told) === JSON.stringify(steering), "how steering stands");
@@ -78,7 +79,7 @@ function testTexts() {
     {...level, frame: -1}, {...level, frame: 2 ** 32}, {...level, frame: "7"}, {...level, level: 2}, {...level, levels: 1e9},
     {...level, bytes: 0}, {...level, bytes: 2 ** 40}, {...level, bytes: 1.5}, {...level, bytes: null}, {...level, width: 0},
     {...level, height: 1e6}, {...level, step: "x"}, {...level, time: {}}, {...level, age: "old"},
-    {...welcome, version: "1"}, {...welcome, session: 3}, {...welcome, series: {times: [1], steps: []}},
+    {...welcome, pulse: "15"}, {...welcome, pulse: -1}, {...welcome, pulse: 1e9}, {...welcome, version: "1"}, {...welcome, session: 3}, {...welcome, series: {times: [1], steps: []}},
     {...welcome, series: {times: ["x"], steps: [1]}}, {...welcome, series: 5}, {...welcome, series: {times: [1], steps: [-1]}},
     {type: "state", state: "asleep", viewers: 1}, {type: "error"}, {type: "missing", cause: "why"}, {type: "missing", frame: 1},
     {type: "missing", frame: -1, cause: "why"}, {type: "series", from: 3, times: 1, steps: 1},
@@ -260,6 +261,34 @@ async function testConnection() {
   live.close();
   await soon(1500);
   check(sockets.length === 5 && live.state === "closed", "what was closed stays closed");
+}
+
+/** A line that was cut in the middle reports nothing. The page notices the silence. */
+async function testSilence() {
+  const pulse = 0.1;
+  const {live, sockets} = connection();
+  sockets[0].open();
+  sockets[0].text({...welcome, series: null, pulse});
+  sockets[0].text({type: "state", state: "live", viewers: 1});
+  sockets[0].text({...level, frame: 8, bytes: 1 << 20});
+  for (let at = 0; at < 15; ++at) {
+    await soon(60);
+    sockets[0].bytes(part(8, 0, at << 10, new Uint8Array(1 << 10)));
+  }
+  check(live.state === "live", `parts of a level are messages, too: ${live.state}`);
+  await soon(450);
+  check(live.state === "live", "the page looks a second time");
+  sockets[0].text({type: "state", state: "live", viewers: 1});
+  await soon(300);
+  check(live.state === "live", "a message that comes before the second look");
+  await soon(450);
+  check(live.state === "lost" && live.cause === "the server doesn't answer", `a line that is cut: ${live.state}`);
+  await soon(500);
+  sockets[1].open();
+  sockets[1].text({...welcome, series: null});
+  await soon(800);
+  check(live.state === "waiting", `a server that promises no pulse may be silent: ${live.state}`);
+  live.close();
 }
 
 /** The decoder takes a level late, amid the next one: acknowledgements of that one go on. */
@@ -528,6 +557,7 @@ testTexts();
 testParts();
 await testManyFrames();
 await testConnection();
+await testSilence();
 await testLateDecoder();
 await testSeries();
 await testPause();

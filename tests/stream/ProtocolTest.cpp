@@ -58,7 +58,7 @@ Controls everyControl() {
 const std::vector<FromServer>& serverMessages() {
   static const std::vector<FromServer> all{
       Welcome{1, "abc", false, std::nullopt, 3},
-      Welcome{1, "abc", true, Series{{0.5, std::nullopt, -1e300}, {1, 2, std::uint64_t{1} << 60U}}, 1},
+      Welcome{1, "abc", true, Series{{0.5, std::nullopt, -1e300}, {1, 2, std::uint64_t{1} << 60U}}, 1, 15},
       SeriesPart{4096, Series{{2.0}, {9}}},
       State{Phase::Waiting, 0},
       State{Phase::Live, 8},
@@ -94,6 +94,8 @@ TEST_CASE("messages are read as they were written") {
   for (const FromServer& m : serverMessages()) CHECK(serverMessage(textOf(m)) == m);
   CHECK(serverMessage(R"({"type":"to come","x":[1]})") == FromServer(Unknown{}));
   // Messages that another program writes.
+  CHECK(serverMessage(R"({"type":"welcome","version":1,"session":"s","steer":false,"viewers":1})") ==
+        FromServer(Welcome{1, "s", false, std::nullopt, 1, 0}));
   CHECK(viewerMessage(R"( {"bytes":5,"more":{"a":[1]},"level":0,"frame":2,"type":"ack"})") ==
         FromViewer(Ack{2, 0, 5}));
   CHECK(std::get<Hello>(viewerMessage(R"({"type":"hello","version":9})")).version == 9);
@@ -166,6 +168,7 @@ TEST_CASE("messages that make no sense are refused") {
   const std::vector<std::string> worse{
       R"({"type":"welcome","version":1,"session":"s","steer":false,"series":{"times":[1],"steps":[]},"viewers":1})",
       R"({"type":"welcome","version":1,"session":"s","steer":false,"series":[],"viewers":1})",
+      R"({"type":"welcome","version":1,"session":"s","steer":false,"viewers":1,"pulse":-1})",
       R"({"type":"state","state":"asleep","viewers":1})",
       R"({"type":"steering","you":1,"period":1,"paused":false})",
       R"({"type":"steering","you":1,"period":1,"paused":false,"parameters":[5]})",

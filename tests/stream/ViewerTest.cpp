@@ -183,6 +183,27 @@ TEST_CASE("what stalled viewers keep is bounded, and the oldest goes first") {
   CHECK(std::get<Viewer::Farewell>(end).code == Close::Stalled);
 }
 
+TEST_CASE("a viewer for whom nothing is new hears the state at each pulse") {
+  Levels levels;
+  Hub hub(limited(1000 * mebibyte));
+  Connected viewer(hub);
+  hub.publish(levels.frame(0), start);
+  const Viewer::Outgoing first = viewer.viewer.next(start);
+  REQUIRE(std::holds_alternative<std::string>(first));
+  const FromServer welcome = serverMessage(std::get<std::string>(first));
+  REQUIRE(std::holds_alternative<Welcome>(welcome));
+  CHECK(std::get<Welcome>(welcome).pulse == 15);
+  viewer.takeAll(start + 5s);
+  for (const auto seconds : {20s, 35s}) {
+    const Viewer::Outgoing nothing = viewer.viewer.next(start + seconds - 1ms);
+    REQUIRE(std::holds_alternative<Viewer::Wait>(nothing));
+    CHECK(std::get<Viewer::Wait>(nothing).until == start + seconds);
+    const Viewer::Outgoing again = viewer.viewer.next(start + seconds);
+    REQUIRE(std::holds_alternative<std::string>(again));
+    CHECK(serverMessage(std::get<std::string>(again)) == FromServer(State{Phase::Live, 1}));
+  }
+}
+
 TEST_CASE("a series of any length comes in parts") {
   Hub hub(limited(mebibyte));
   Series series;

@@ -155,11 +155,8 @@ Json jsonOf(const Steer& steer) {
   return message;
 }
 Json jsonOf(const Welcome& welcome) {
-  Json message{{"type", "welcome"},
-               {"version", welcome.version},
-               {"session", welcome.session},
-               {"steer", welcome.steer},
-               {"viewers", welcome.viewers}};
+  Json message{{"type", "welcome"},      {"version", welcome.version}, {"session", welcome.session},
+               {"steer", welcome.steer}, {"viewers", welcome.viewers}, {"pulse", welcome.pulse}};
   message["series"] = welcome.series ? jsonOf(*welcome.series) : Json();
   return message;
 }
@@ -221,6 +218,7 @@ Welcome welcomeIn(const Fields& fields) {
   welcome.session = fields.text("session");
   welcome.steer = fields.flag("steer");
   welcome.viewers = fields.count("viewers");
+  if (fields.has("pulse")) welcome.pulse = fields.count("pulse");
   if (fields.has("series")) {
     const Json& series = fields.at("series");
     if (!series.is_object()) refuse("\"series\" isn't an object");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -28,6 +29,9 @@ inline constexpr std::size_t chunkHeadBytes = 16;
 inline constexpr std::uint64_t ackBytes = std::uint64_t{512} << 10;
 /// Entries of a series in one message, at most.
 inline constexpr std::size_t seriesEntries = 4096;
+/// A server says its state again when a viewer has had no message for so long. Scripts in a page don't see
+/// the pings that keep other viewers' connections alive.
+inline constexpr std::chrono::seconds pulse{15};
 
 /// Why a connection is closed: WebSocket's status codes, of which 4000 to 4999 are for applications.
 enum class Close : std::uint16_t {
@@ -98,6 +102,7 @@ struct Welcome {
   bool steer = false;
   std::optional<Series> series;
   std::uint32_t viewers = 0;
+  std::uint32_t pulse = 0;  // seconds after which the state comes again; 0: an older server, and it doesn't
   bool operator==(const Welcome&) const = default;
 };
 /// More of a series: its entries from `from` on.

@@ -267,7 +267,8 @@ std::optional<std::string> Viewer::news() {
   const std::optional<Series>& series = hub_.series_;
   if (!wasWelcomed_) {
     wasWelcomed_ = true;
-    Welcome welcome{protocolVersion, hub_.session_, hub_.canSteer(), std::nullopt, hub_.viewerCount()};
+    Welcome welcome{protocolVersion, hub_.session_,      hub_.canSteer(),
+                    std::nullopt,    hub_.viewerCount(), static_cast<std::uint32_t>(pulse.count())};
     if (series) {
       welcome.series = partOf(*series, 0);
       seriesSent_ = welcome.series->size();
@@ -301,6 +302,22 @@ std::string Viewer::announcement(const Outbox::LevelPart& part, Clock::time_poin
 }
 
 Viewer::Outgoing Viewer::next(Clock::time_point now) {
+  Outgoing outgoing = ahead(now);
+  auto* const wait = std::get_if<Wait>(&outgoing);
+  if (wait == nullptr) {
+    sentAt_ = now;
+  } else if (wasWelcomed_) {
+    const Clock::time_point due = sentAt_ + pulse;
+    if (now >= due) {
+      sentAt_ = now;
+      return textOf(hub_.state());
+    }
+    wait->until = std::min(wait->until.value_or(due), due);
+  }
+  return outgoing;
+}
+
+Viewer::Outgoing Viewer::ahead(Clock::time_point now) {
   if (farewell_) {
     if (std::exchange(isCauseTold_, true)) return *farewell_;
     if (farewell_->code == Close::GoingAway) return textOf(State{Phase::Ended, hub_.viewerCount()});

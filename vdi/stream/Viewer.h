@@ -123,6 +123,7 @@ class Viewer {
   Outgoing next(Clock::time_point now);
 
  private:
+  Outgoing ahead(Clock::time_point now);
   void enter(const Hello& hello, Clock::time_point now);
   void show(std::uint32_t index);
   void drive();
@@ -142,6 +143,7 @@ class Viewer {
   bool wasWelcomed_ = false;
   std::size_t seriesSent_ = 0;
   std::optional<State> stateSent_;
+  Clock::time_point sentAt_;            // of the last message
   std::optional<std::uint32_t> shown_;  // of the series
   std::optional<Missing> missing_;
   std::uint32_t number_ = 0;  // from 1 in each session
