@@ -27,7 +27,7 @@ void Relay::step(std::chrono::milliseconds time) {
 }
 
 void Relay::follow(const stream::Client::Standing& standing) {
-  if (standing.session.empty()) return;
+  if (standing.session.empty()) return tell(standing);
   if (session_ != standing.session) {
     if (!session_.empty()) restart();
     session_ = standing.session;
@@ -38,9 +38,24 @@ void Relay::follow(const stream::Client::Standing& standing) {
     server_->append(std::move(more));
   }
   // Until the other server has told its state, `standing` has the state of the connection before.
-  if (!standing.hasState || phase_ == standing.state.phase) return;
-  phase_ = standing.state.phase;
-  server_->setPhase(*phase_);
+  if (standing.hasState) phase_ = standing.state.phase;
+  tell(standing);
+}
+
+/// Tells viewers of the other server's state, or that it doesn't answer. A run that has ended needs no
+/// answer.
+void Relay::tell(const stream::Client::Standing& standing) {
+  stream::State state{phase_.value_or(stream::Phase::Waiting), 0, {}};
+  const bool isOver = state.phase == stream::Phase::Ended && standing.hasBeenLive;
+  if (standing.isConnected) {
+    if (standing.hasState) state.cause = standing.state.cause;
+  } else if (!standing.trouble.empty() && !isOver) {
+    state.cause = "the source doesn't answer";
+    if (state.phase == stream::Phase::Live) state.phase = stream::Phase::Waiting;
+  }
+  if (state == told_) return;
+  server_->setPhase(state.phase, state.cause);
+  told_ = std::move(state);
 }
 
 /// Starts a new server, and so a new session, because the other server's new session numbers its frames anew.
@@ -52,6 +67,7 @@ void Relay::restart() {
   }
   seriesPassed_ = 0;
   phase_.reset();
+  told_ = {};
   current_.reset();
   whole_.clear();
   asked_.reset();

@@ -18,7 +18,7 @@ namespace vdi::apps {
 
 /// A client of the other server and a server of its own. It passes on frames unchanged. If a viewer
 /// asks for a frame of the series, the relay fetches it, and newer frames wait meanwhile. If the
-/// other server restarts, viewers see a restart, too.
+/// other server restarts, viewers see a restart, too. While it doesn't answer, they are told so.
 class Relay {
  public:
   /// Throws Error as Client and Server do.
@@ -32,6 +32,7 @@ class Relay {
 
  private:
   void follow(const stream::Client::Standing& standing);
+  void tell(const stream::Client::Standing& standing);
   void restart();
   void ask();
   void pass(stream::Received received);
@@ -41,7 +42,8 @@ class Relay {
   stream::ServerOptions options_;
   std::string session_;  // the other server's
   std::size_t seriesPassed_ = 0;
-  std::optional<stream::Phase> phase_;
+  std::optional<stream::Phase> phase_;            // the other server's
+  stream::State told_;                            // to this server's viewers, but for their number
   std::shared_ptr<const stream::Frame> current_;  // the frame that is arriving
   std::uint32_t firstLevel_ = 0;                  // of current_, as the other server counts
   std::list<stream::FramePtr> whole_;             // the latest whole frames

@@ -71,6 +71,8 @@ export class Live {
     this.state = "connecting";
     /** The reason for being lost or refused, in one line. */
     this.cause = "";
+    /** Why the server, which is there, gets no frames: one that relays may have lost its source. */
+    this.trouble = "";
     /** Whether this connection's server has been live. A finished series never is. */
     this.hasBeenLive = false;
     /** Whether the run has ended. It stays so while the page looks for another one. */
@@ -140,6 +142,7 @@ export class Live {
     this.assembler.drop();
     this.waiting = this.heldBack = undefined;
     this.isServerPaused = false;
+    this.trouble = "";
     this.steering = null;
     this.denied = "";
     socket?.close();
@@ -247,6 +250,7 @@ export class Live {
       this.change(this.state, this.cause);
     } else if (message.type === "state") {
       this.viewers = message.viewers;
+      this.trouble = message.cause;
       if (message.state !== "ended") this.hasBeenLive = true;
       this.hasEnded = message.state === "ended" && this.hasBeenLive;
       this.change(message.state, "");
@@ -309,7 +313,7 @@ export class Live {
     this.arrivals = [...this.arrivals.filter(({at}) => performance.now() - at < RATE_MS),
                      {at: performance.now(), bytes: part.byteLength}];
     if (!level) return;
-    if (this.state === "waiting" || this.state === "connecting") this.change("live", "");
+    if ((this.state === "waiting" && this.trouble === "") || this.state === "connecting") this.change("live", "");
     const acknowledge = (/** @type {number} */ bytes) =>
       this.send({type: "ack", frame: level.frame, level: level.level, bytes});
     if (!file) {

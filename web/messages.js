@@ -41,7 +41,8 @@ function refuse(what) {
  * @typedef {{type: "series", from: number} & Series} SeriesPart a series' further frames, beginning
  *     at `from`
  * @typedef {{type: "error", cause: string}} Refusal
- * @typedef {{type: "state", state: "waiting" | "live" | "ended", viewers: number}} ServerState
+ * @typedef {{type: "state", state: "waiting" | "live" | "ended", viewers: number, cause: string}} ServerState
+ *     `cause`: why no frames come although they should; may be empty
  * @typedef {{type: "level"} & Level} LevelBegin
  * @typedef {{name: string, whole: boolean, value: number, low: number, high: number}} Parameter a
  *     parameter of the simulation, with its present value
@@ -204,7 +205,8 @@ export function serverMessageOf(text) {
       return {type: "error", cause: causeOf(json.cause)};
     case "state":
       if (!["waiting", "live", "ended"].includes(json.state)) refuse("a state that this page doesn't know");
-      return {type: "state", state: json.state, viewers: viewersOf(json.viewers)};
+      return {type: "state", state: json.state, viewers: viewersOf(json.viewers),
+              cause: json.cause === undefined ? "" : causeOf(json.cause)};
     case "steering":
       return steeringOf(json);
     case "denied":

@@ -81,14 +81,14 @@ function testTexts() {
     {...level, height: 1e6}, {...level, step: "x"}, {...level, time: {}}, {...level, age: "old"},
     {...welcome, pulse: "15"}, {...welcome, pulse: -1}, {...welcome, pulse: 1e9}, {...welcome, version: "1"}, {...welcome, session: 3}, {...welcome, series: {times: [1], steps: []}},
     {...welcome, series: {times: ["x"], steps: [1]}}, {...welcome, series: 5}, {...welcome, series: {times: [1], steps: [-1]}},
-    {type: "state", state: "asleep", viewers: 1}, {type: "error"}, {type: "missing", cause: "why"}, {type: "missing", frame: 1},
+    {type: "state", state: "asleep", viewers: 1}, {type: "state", state: "live", viewers: 1, cause: 5}, {type: "error"}, {type: "missing", cause: "why"}, {type: "missing", frame: 1},
     {type: "missing", frame: -1, cause: "why"}, {type: "series", from: 3, times: 1, steps: 1},
   ];
   for (const message of bad) {
     const text = typeof message === "string" ? message : JSON.stringify(message);
     check(outcome(() => serverMessageOf(text)) === "refused", `${text.slice(0, 100)} is taken`);
   }
-  const sound = [level, welcome, steering, {type: "state", state: "live", viewers: 1},
+  const sound = [level, welcome, steering, {type: "state", state: "live", viewers: 1, cause: "why"},
                  {type: "error", cause: "why"}, {type: "missing", frame: 3, cause: "why"}].map((m) => JSON.stringify(m));
   const end = performance.now() + 1000 * Number(process.env.VDI_FUZZ_SECONDS ?? 0);
   for (let round = 0; round < 20000 || performance.now() < end; ++round) {
@@ -484,6 +484,26 @@ async function testEndedRun() {
   series.live.close();
 }
 
+/** A relay whose source is gone. */
+async function testLostSource() {
+  const {live, sockets} = panelOf();
+  sockets[0].open();
+  sockets[0].text({...welcome, series: null});
+  sockets[0].text({type: "state", state: "live", viewers: 1});
+  sendLevel(sockets[0], 4, 0, 7);
+  await soon(20);
+  const [line, light] = [() => liveText(live, performance.now()), () => document.getElementById("live")?.dataset.state];
+  check(light() === "live", `a relay that gets frames: ${light()}`);
+  sockets[0].text({type: "state", state: "waiting", viewers: 1, cause: "the source doesn't answer"});
+  check(light() === "waiting" && line().includes("the source doesn't answer"), `a relay without a source: ${light()}, ${line()}`);
+  sendLevel(sockets[0], 4, 1, 8);
+  await soon(20);
+  check(light() === "waiting" && line().includes("the source doesn't answer"), `a frame that the relay has kept: ${light()}, ${line()}`);
+  sockets[0].text({type: "state", state: "live", viewers: 1});
+  check(light() === "live" && !line().includes("source"), `the source is back: ${light()}, ${line()}`);
+  live.close();
+}
+
 /** What a request for a frame of a series comes to: it ends, whatever becomes of the frame. */
 async function testMissingFrames() {
   const {panel, live, sockets} = panelOf();
@@ -562,6 +582,7 @@ await testLateDecoder();
 await testSeries();
 await testPause();
 await testEndedRun();
+await testLostSource();
 await testMissingFrames();
 check(Math.abs(rateOf(10000, [{at: 8000, bytes: 1000}, {at: 9000, bytes: 3000}, {at: 1000, bytes: 1e9}]) - 2000) < 1, "the rate");
 console.log(failures === 0 ? "all well" : `${failures} failures`);

@@ -200,7 +200,7 @@ TEST_CASE("a viewer for whom nothing is new hears the state at each pulse") {
     CHECK(std::get<Viewer::Wait>(nothing).until == start + seconds);
     const Viewer::Outgoing again = viewer.viewer.next(start + seconds);
     REQUIRE(std::holds_alternative<std::string>(again));
-    CHECK(serverMessage(std::get<std::string>(again)) == FromServer(State{Phase::Live, 1}));
+    CHECK(serverMessage(std::get<std::string>(again)) == FromServer(State{Phase::Live, 1, {}}));
   }
 }
 

@@ -175,6 +175,18 @@ class PipeTest(ServedFolder):
         self.assertEqual(levels[1], self.bytes_of("large"))
         self.assertEqual(third.end(), 0)
 
+    def test_viewers_hear_that_the_source_is_gone(self):
+        self.appear("small0", "a.vdi")
+        first = self.serve("--token-file", self.token(), self.live)
+        relay = self.serve("--from", first.address, "--from-token-file", self.token())
+        viewer = self.view(relay)
+        self.assertEqual(next(viewer.levels())[1], self.bytes_of("small0"))
+        first.kill()
+        while "cause" not in (state := viewer.text_message("state")):
+            pass
+        self.assertEqual((state["state"], state["cause"]), ("waiting", "the source doesn't answer"))
+        self.assertEqual(relay.end(), 0)
+
     def token(self):
         path = self.folder / "token"
         path.write_text("t" * 32)

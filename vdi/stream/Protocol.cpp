@@ -167,7 +167,9 @@ Json jsonOf(const SeriesPart& part) {
   return message;
 }
 Json jsonOf(const State& state) {
-  return {{"type", "state"}, {"state", nameOf(state.phase)}, {"viewers", state.viewers}};
+  Json message{{"type", "state"}, {"state", nameOf(state.phase)}, {"viewers", state.viewers}};
+  if (!state.cause.empty()) message["cause"] = state.cause;
+  return message;
 }
 Json jsonOf(const Level& level) {
   return {{"type", "level"},        {"frame", level.frame},    {"level", level.level},
@@ -289,7 +291,10 @@ FromServer serverMessage(std::string_view text) {
   const std::string type = fields.text("type");
   if (type == "welcome") return welcomeIn(fields);
   if (type == "series") return SeriesPart{fields.count("from"), fields.series()};
-  if (type == "state") return State{phaseOf(fields.text("state")), fields.count("viewers")};
+  if (type == "state") {
+    return State{phaseOf(fields.text("state")), fields.count("viewers"),
+                 fields.has("cause") ? fields.text("cause") : std::string()};
+  }
   if (type == "level") return levelIn(fields);
   if (type == "missing") return Missing{fields.count("frame"), fields.text("cause")};
   if (type == "steering") return steeringIn(fields, object);

@@ -115,6 +115,7 @@ enum class Phase { Waiting, Live, Ended };
 struct State {
   Phase phase = Phase::Waiting;
   std::uint32_t viewers = 0;
+  std::string cause;  // why no frames come although they should; empty: nothing is wrong
   bool operator==(const State&) const = default;
 };
 /// The next binary messages are of this level, until another comes.

@@ -309,8 +309,8 @@ void Server::append(Series entries) {
   impl_->onThread([&hub = impl_->hub(), held = std::move(entries)] { hub.append(held); });
 }
 
-void Server::setPhase(Phase phase) {
-  impl_->onThread([&hub = impl_->hub(), phase] { hub.setPhase(phase); });
+void Server::setPhase(Phase phase, std::string cause) {
+  impl_->onThread([&hub = impl_->hub(), phase, held = std::move(cause)] { hub.setPhase(phase, held); });
 }
 
 void Server::setControls(Controls controls) {

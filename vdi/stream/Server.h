@@ -72,7 +72,8 @@ class Server {
   bool isWanted(std::uint32_t index) const;
   /// Appends entries to the series.
   void append(Series entries);
-  void setPhase(Phase phase);
+  /// `cause`: why no frames come although they should; viewers see it.
+  void setPhase(Phase phase, std::string cause = {});
   /// Sets what can be steered, and what is in force. Viewers are told of changes.
   void setControls(Controls controls);
   /// Serves a connected stream socket, which it owns from now on.

@@ -31,7 +31,7 @@ void Hub::wakeAll() {
 void Hub::publish(FramePtr frame, Clock::time_point now) {
   if (!newest_ || newest_->id != frame->id) ++published_;
   newest_ = std::move(frame);
-  if (phase_ == Phase::Waiting) phase_ = Phase::Live;
+  if (phase_ == Phase::Waiting && cause_.empty()) phase_ = Phase::Live;
   for (Viewer* const viewer : viewers_) {
     if (!viewer->shown_) viewer->offer(newest_, now);
   }
@@ -102,8 +102,9 @@ void Hub::append(const Series& entries) {
   wakeAll();
 }
 
-void Hub::setPhase(Phase phase) {
+void Hub::setPhase(Phase phase, std::string cause) {
   phase_ = phase;
+  cause_ = std::move(cause);
   wakeAll();
 }
 
@@ -320,7 +321,7 @@ Viewer::Outgoing Viewer::next(Clock::time_point now) {
 Viewer::Outgoing Viewer::ahead(Clock::time_point now) {
   if (farewell_) {
     if (std::exchange(isCauseTold_, true)) return *farewell_;
-    if (farewell_->code == Close::GoingAway) return textOf(State{Phase::Ended, hub_.viewerCount()});
+    if (farewell_->code == Close::GoingAway) return textOf(State{Phase::Ended, hub_.viewerCount(), {}});
     return textOf(Refusal{farewell_->cause});
   }
   if (!isWelcome_) return Wait{};

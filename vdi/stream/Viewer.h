@@ -41,7 +41,7 @@ class Hub {
   explicit Hub(Options options);
 
   /// Offers the newest frame, or more levels of it, to all viewers that don't look at an older one. Ends the
-  /// phase Waiting: it becomes Live.
+  /// phase Waiting, unless that has a cause: it becomes Live.
   void publish(FramePtr frame, Clock::time_point now);
   /// Offers a frame of the series to the viewers that asked for it.
   void provide(const FramePtr& frame, Clock::time_point now);
@@ -50,7 +50,8 @@ class Hub {
   /// Whether a viewer still waits for that frame of the series, or looks at it.
   bool isWanted(std::uint32_t index) const;
   void append(const Series& entries);
-  void setPhase(Phase phase);
+  /// `cause`: why no frames come although they should.
+  void setPhase(Phase phase, std::string cause = {});
   /// Sets what can be steered, and what is in force.
   void setControls(Controls controls);
 
@@ -60,7 +61,7 @@ class Hub {
   const std::optional<Series>& series() const { return series_; }
   std::uint32_t viewerCount() const { return static_cast<std::uint32_t>(viewers_.size()); }
   std::uint64_t published() const { return published_; }
-  State state() const { return {phase_, viewerCount()}; }
+  State state() const { return {phase_, viewerCount(), cause_}; }
   /// Bytes of frames that are kept for viewers alone, the newest frame apart.
   std::uint64_t heldBytes() const;
 
@@ -77,6 +78,7 @@ class Hub {
   TokenCheck token_;
   std::string session_;
   Phase phase_ = Phase::Waiting;
+  std::string cause_;
   FramePtr newest_;
   std::optional<Series> series_;
   std::uint64_t published_ = 0;
