@@ -80,7 +80,7 @@ export function liveText(live, now) {
   if (shown) {
     if (live.series && live.wanted !== null) parts.push(`frame ${shown.frame + 1} of ${live.series.steps.length}`);
     if (shown.step !== null) parts.push(`step ${shown.step}`);
-    if (shown.time !== null) parts.push(`t = ${Number(shown.time.toPrecision(6))}`);
+    if (shown.time !== null) parts.push(`t = ${Number(shown.time.toPrecision(10))}`);
     if (!isSeries && live.wanted === null) parts.push(ageText((now - shown.madeAt) / 1000));
     if (shown.levels > 1) parts.push(shown.level + 1 < shown.levels ? `level ${shown.level + 1} of ${shown.levels}` : "full");
   }

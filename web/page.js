@@ -252,7 +252,7 @@ class Page {
       if (!viewer.isLost) tell("");
       const hasTime = vdi.timeStep !== 0 || vdi.time !== 0;
       this.showFacts([source.nameOf(frame),
-                      ...hasTime ? [`step ${vdi.timeStep}`, `t = ${Number(vdi.time.toPrecision(6))}`] : []]);
+                      ...hasTime ? [`step ${vdi.timeStep}`, `t = ${Number(vdi.time.toPrecision(10))}`] : []]);
       showLegend(element("legend"), vdi.coloring);
       this.showView();
       return "shown";

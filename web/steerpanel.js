@@ -15,6 +15,7 @@ import {cameraText} from "./camera.js";
  * @property {() => number} angle between that camera and the VDI's, in degrees
  */
 
+const ENDS = ["low", "high"];  // fields of the colours' range
 const AUTO_DEGREES = 15;   // beyond this angle Auto requests a new viewpoint
 const RESOLUTIONS = ["480 × 270", "640 × 360", "960 × 540", "1280 × 720", "1920 × 1080"];
 
@@ -31,8 +32,17 @@ export function wishedCamera({position, focalPoint, viewUp, parallel, parallelSc
   return {position, focalPoint, viewUp, ...parallel ? {parallelScale} : {viewAngle}};
 }
 
-/** @param {number} value */
-const shortText = (value) => String(Number(value.toPrecision(6)));
+const SLIDER_STEPS = 500;
+
+/**
+ * A slider's value, without the digits that its steps don't resolve.
+ * @param {number} value
+ * @param {number} step of the slider
+ */
+export function steppedValue(value, step) {
+  const digits = Math.floor(Math.log10(Math.abs(value))) - Math.floor(Math.log10(step)) + 2;
+  return value === 0 ? 0 : Number(value.toPrecision(Math.min(Math.max(digits, 1), 17)));
+}
 
 /** A parameter's row: its name, a slider, and a field for exact values. */
 class ParameterRow {
@@ -49,12 +59,14 @@ class ParameterRow {
       one.max = String(high);
       one.setAttribute("aria-label", name);
     }
-    this.slider.step = whole ? "1" : String((high - low) / 500 || 1);
+    const step = whole ? Math.max(1, Math.floor((high - low) / SLIDER_STEPS)) : (high - low) / SLIDER_STEPS || 1;
+    this.slider.step = String(step);
     this.field.step = whole ? "1" : "any";
-    this.slider.addEventListener("input", () => this.field.value = shortText(this.slider.valueAsNumber));
+    const sliderValue = () => whole ? this.slider.valueAsNumber : steppedValue(this.slider.valueAsNumber, step);
+    this.slider.addEventListener("input", () => this.field.value = String(sliderValue()));
     for (const one of [this.slider, this.field]) {
       one.addEventListener("change", () => {
-        const value = one === this.slider ? Number(shortText(one.valueAsNumber)) : one.valueAsNumber;
+        const value = one === this.slider ? sliderValue() : one.valueAsNumber;
         if (Number.isFinite(value)) ask({parameters: {[name]: Math.min(Math.max(value, low), high)}});
       });
     }
@@ -68,7 +80,7 @@ class ParameterRow {
     this.slider.disabled = this.field.disabled = !isMine;
     if (this.slider.matches(":active") || document.activeElement === this.field) return;  // the user is changing it
     this.slider.value = String(value);
-    this.field.value = shortText(value);
+    this.field.value = String(value);
   }
 }
 
@@ -82,6 +94,10 @@ export class SteerPanel {
     this.declared = "";
     /** The camera of the last request, as text. */
     this.asked = "";
+    /** Ends of the colours' range that the user has edited since the fields last showed the range in force. */
+    this.edited = new Set();
+    /** Whether the edited range can't be asked for yet: its ends don't ascend. */
+    this.isUnsent = false;
     partOf("drive").addEventListener("click", () => this.isMine() ? live.release() : live.drive());
     partOf("newview").addEventListener("click", () => this.askForView());
     partOf("halt").addEventListener("click", () => this.ask({paused: !live.steering?.paused}));
@@ -94,11 +110,9 @@ export class SteerPanel {
     fieldOf("preset").addEventListener("change", () => {
       if (fieldOf("preset").value !== "") this.ask({preset: fieldOf("preset").value});
     });
-    for (const id of ["low", "high"]) {
-      fieldOf(id).addEventListener("change", () => {
-        const low = fieldOf("low").valueAsNumber, high = fieldOf("high").valueAsNumber;
-        if (low < high) this.ask({range: [low, high]});
-      });
+    for (const id of ENDS) {
+      fieldOf(id).addEventListener("input", () => this.edited.add(id));
+      fieldOf(id).addEventListener("change", () => this.askForRange());
     }
     fieldOf("auto").addEventListener("change", () => this.onRest());
   }
@@ -120,6 +134,32 @@ export class SteerPanel {
   /** @param {Wish} wish */
   ask(wish) {
     if (this.isMine()) this.live.steer(wish);
+  }
+
+  /** Asks for the edited range. The other end stays as it is in force. */
+  askForRange() {
+    const range = this.live.steering?.generator?.range;
+    if (!range) return;
+    for (const id of ENDS) if (!Number.isFinite(fieldOf(id).valueAsNumber)) this.edited.delete(id);
+    const [low, high] = ENDS.map((id, i) => this.edited.has(id) ? fieldOf(id).valueAsNumber : range[i]);
+    this.isUnsent = !(low < high);
+    if (!this.isUnsent && this.edited.size > 0) this.ask({range: [low, high]});
+    this.refresh();
+  }
+
+  /**
+   * Shows the range in force, unless the user is at work on another one.
+   * @param {[number, number]} range
+   */
+  showRange(range) {
+    if (!this.isMine()) {
+      this.edited.clear();
+      this.isUnsent = false;
+    }
+    partOf("rangenote").hidden = !this.isUnsent;
+    if (this.isUnsent || ENDS.some((id) => document.activeElement === fieldOf(id))) return;
+    this.edited.clear();
+    ENDS.forEach((id, i) => fieldOf(id).value = String(range[i]));
   }
 
   askForView() {
@@ -160,8 +200,7 @@ export class SteerPanel {
       this.put("supersegments", String(generator.supersegments));
       this.choose("resolution", RESOLUTIONS, width > 0 ? `${width} × ${height}` : "");
       this.choose("preset", generator.presets, "");
-      this.put("low", shortText(generator.range?.[0] ?? 0));
-      this.put("high", shortText(generator.range?.[1] ?? 1));
+      this.showRange(generator.range ?? [0, 1]);
     }
     this.showParameters(parameters, isMine);
   }

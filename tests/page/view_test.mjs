@@ -3,6 +3,7 @@
 import {toView, basisOf, halfHeightOf} from "../../web/camera.js";
 import {addControls} from "../../web/controls.js";
 import {numberText} from "../../web/legend.js";
+import {SteerPanel, steppedValue} from "../../web/steerpanel.js";
 import {Viewer} from "../../web/viewer.js";
 
 let failures = 0;
@@ -218,10 +219,102 @@ function testNumbers() {
   for (const [got, expected] of cases) check(got === expected, `numbers: ${got}, not ${expected}`);
 }
 
+/** A page of fields without a browser: a field shows what it is set to, and `enter` is a user who types and leaves it. */
+function fields() {
+  /** @type {Map<string, any>} */
+  const elements = new Map();
+  const make = () => {
+    /** @type {Map<string, (() => void)[]>} */
+    const listeners = new Map();
+    return {
+      value: "", hidden: false, disabled: false, checked: false, textContent: "", validity: {valid: true}, options: [],
+      get valueAsNumber() { return this.value === "" ? NaN : Number(this.value); },
+      addEventListener: (/** @type {string} */ name, /** @type {() => void} */ act) =>
+        listeners.set(name, [...listeners.get(name) ?? [], act]),
+      fire: (/** @type {string} */ name) => (listeners.get(name) ?? []).forEach((act) => act()),
+      setAttribute: () => {}, matches: () => false, replaceChildren: () => {},
+    };
+  };
+  const byId = (/** @type {string} */ id) => {
+    if (!elements.has(id)) elements.set(id, make());
+    return elements.get(id);
+  };
+  const page = {getElementById: byId, createElement: make, querySelectorAll: () => [], /** @type {any} */ activeElement: null};
+  Object.assign(globalThis, {document: page, Option: class {}});
+  const enter = (/** @type {any} */ field, /** @type {number | string} */ value) => {
+    page.activeElement = field;
+    field.value = String(value);
+    field.fire("input");
+    field.fire("change");
+  };
+  return {byId, enter, leave: () => page.activeElement = null};
+}
+
+/** A steering panel, what it asks for, and how the server's state reaches it. */
+function steered() {
+  const page = fields();
+  /** @type {any[]} */
+  const asked = [];
+  /** @type {any} */
+  const live = {steering: null, denied: "", steer: (/** @type {any} */ wish) => asked.push(wish)};
+  const panel = new SteerPanel(live, {camera: () => undefined, angle: () => 0});
+  const say = (/** @type {any} */ generator, /** @type {any[]} */ parameters = []) => {
+    live.steering = {you: 1, driver: 1, period: 1, paused: false, parameters,
+                     generator: {resolution: [640, 360], supersegments: 25, presets: [], ...generator}};
+    panel.refresh();
+  };
+  return {...page, panel, say, asked: () => JSON.stringify(asked.splice(0))};
+}
+
+function testNumbersOfThePanel() {
+  check(steppedValue(101325.123456789, 0.00172) === 101325.1235, `a slider's digits: ${steppedValue(101325.123456789, 0.00172)}`);
+  check(steppedValue(0.30000000000000004, 0.0002) === 0.3 && steppedValue(0, 0.1) === 0 && steppedValue(1e-9, 1) === 1e-9,
+        "a slider's values near 0");
+  const {byId, enter, leave, panel, say, asked} = steered();
+  const range = [101325.12, 101325.98];
+  const whole = {name: "cells", whole: true, value: 1234567, low: 0, high: 1e7};
+  say({range}, [whole]);
+  check(byId("low").value === "101325.12" && byId("high").value === "101325.98", `a narrow range: ${byId("low").value}, ${byId("high").value}`);
+  enter(byId("high"), 101326);
+  check(asked() === '[{"range":[101325.12,101326]}]', "the end that isn't edited stays");
+  leave();
+  const [{slider, field}] = panel.rows;
+  check(field.value === "1234567" && slider.step === "20000", `a whole parameter: ${field.value}, step ${slider.step}`);
+  enter(slider, 1240000);
+  check(asked() === '[{"parameters":{"cells":1240000}}]' && field.value === "1240000", `a step of a whole slider: ${field.value}`);
+  say({range}, [{name: "rate", whole: false, value: 0.1234567891, low: 0, high: 1}]);
+  leave();
+  panel.refresh();
+  check(panel.rows[0].field.value === "0.1234567891", `a number in full: ${panel.rows[0].field.value}`);
+}
+
+function testRangeUpwards() {
+  const {byId, enter, leave, panel, say, asked} = steered();
+  say({range: [0, 1]});
+  enter(byId("low"), 5);
+  check(asked() === "[]" && !byId("rangenote").hidden, "a range whose ends don't ascend isn't asked for, and the panel says so");
+  leave();
+  say({range: [0, 1]});
+  check(byId("low").value === "5", `an end that can't be asked for yet stays: ${byId("low").value}`);
+  enter(byId("high"), 10);
+  check(asked() === '[{"range":[5,10]}]' && byId("rangenote").hidden, "both ends are asked for together");
+  say({range: [0, 1]});
+  check(byId("low").value === "5", "the fields stay while the user is in one of them");
+  leave();
+  say({range: [5, 10]});
+  check(byId("low").value === "5" && byId("high").value === "10", "the range in force");
+  enter(byId("low"), "");
+  leave();
+  panel.refresh();
+  check(asked() === "[]" && byId("low").value === "5", `an emptied field: ${byId("low").value}`);
+}
+
 testRest();
 await testScreenshot();
 testRoll();
 testPan();
 testNumbers();
+testNumbersOfThePanel();
+testRangeUpwards();
 console.log(failures === 0 ? "all well" : `${failures} failures`);
 process.exit(failures === 0 ? 0 : 1);
