@@ -51,7 +51,7 @@ function fragment() {
   return new URLSearchParams(location.hash.slice(1));
 }
 
-class Page {
+export class Page {
   constructor() {
     this.darkScheme = window.matchMedia("(prefers-color-scheme: dark)");
     this.decoder = new Decoder(document.querySelector("script[type=module]")?.textContent ?? "");
@@ -71,6 +71,8 @@ class Page {
     /** Counts requests for frames. A late answer to an older request is dropped. */
     this.request = 0;
     this.ownBackground = false;
+    /** @type {Camera | undefined} the last camera of a motion to the VDI's viewpoint that isn't over */
+    this.homeward = undefined;
     this.viewer.onRest = () => {
       this.keepInUrl();
       this.steer?.onRest();
@@ -207,8 +209,7 @@ class Page {
   }
 
   /**
-   * Shows a level of a server's frame. The camera stays unless it is at the last VDI's viewpoint.
-   * Then it moves to the new VDI's viewpoint.
+   * Shows a level of a server's frame.
    * @param {PreparedVdi} vdi
    * @param {Arrived} level
    * @returns {Promise<boolean>} whether the page shows it
@@ -225,15 +226,26 @@ class Page {
     if (!before) {
       this.takeUrl();
       if (!viewer.isLost) tell("");
-    } else if (viewer.camera && cameraText(viewer.camera) === cameraText(before.camera)) {
-      this.setCamera(vdi.camera, false);
-    } else if (viewer.camera && viewer.camera.parallel !== vdi.camera.parallel) {
-      this.setCamera(vdi.camera, false);
     }
+    this.follow(before);
     this.showFacts([]);
     showLegend(element("legend"), vdi.coloring);
     this.showView();
     return true;
+  }
+
+  /**
+   * Moves the camera to the viewpoint of the VDI on show if it was at the former one's. Another
+   * camera stays, unless it has the other kind of projection.
+   * @param {PreparedVdi | undefined} before the former one
+   */
+  follow(before) {
+    const {vdi, viewer} = this;
+    if (!vdi) return;
+    const {camera} = viewer;
+    if (!camera || camera.parallel !== vdi.camera.parallel) return this.setCamera(vdi.camera, false);
+    if (camera === this.homeward) return;  // its motion ends at this VDI's viewpoint
+    if (before && cameraText(camera) === cameraText(before.camera)) this.setCamera(vdi.camera, false);
   }
 
   /** @param {number} frame @returns {Promise<Outcome>} */
@@ -246,9 +258,10 @@ class Page {
       if (!this.vdi) tell("Reading…");
       const vdi = await source.load(frame);
       if (!isWanted() || !await viewer.setVdi(vdi, isWanted)) return "failed";
+      const before = this.vdi;
       this.vdi = vdi;
       this.frame = frame;
-      if (!viewer.camera || viewer.camera.parallel !== vdi.camera.parallel) this.setCamera(vdi.camera, false);
+      this.follow(before);
       if (!viewer.isLost) tell("");
       const hasTime = vdi.timeStep !== 0 || vdi.time !== 0;
       this.showFacts([source.nameOf(frame),
@@ -324,13 +337,15 @@ class Page {
   goHome() {
     const {vdi, viewer} = this;
     if (!vdi || !viewer.camera) return;
-    const from = viewer.camera, to = vdi.camera;
+    const from = viewer.camera;
     const start = performance.now();
     let last = from;
     const step = () => {
-      if (viewer.camera !== last) return;  // the user moves the camera again
+      const to = this.vdi?.camera;
+      if (!to || viewer.camera !== last) return;  // the user moves the camera again
       const share = Math.min((performance.now() - start) / MOTION_MS, 1);
       last = share < 1 ? between(from, to, share * share * (3 - 2 * share)) : to;
+      this.homeward = share < 1 ? last : undefined;
       this.setCamera(last);
       if (share < 1) requestAnimationFrame(step);
     };

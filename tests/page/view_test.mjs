@@ -6,6 +6,9 @@ import {numberText} from "../../web/legend.js";
 import {SteerPanel, steppedValue} from "../../web/steerpanel.js";
 import {Viewer} from "../../web/viewer.js";
 
+Object.assign(globalThis, {postMessage: () => {}});  // the page's script is that of its worker, too
+const {Page} = await import("../../web/page.js");
+
 let failures = 0;
 const check = (/** @type {boolean} */ holds, /** @type {string} */ what) => {
   if (holds) return;
@@ -309,6 +312,62 @@ function testRangeUpwards() {
   check(asked() === "[]" && byId("low").value === "5", `an emptied field: ${byId("low").value}`);
 }
 
+/** A page whose viewer shows what it is given, and which shows no words but its message. */
+function pageOf() {
+  const {byId} = fields();
+  Object.assign(globalThis, {location: {hash: ""}});
+  /** @type {any} */
+  const viewer = {camera: undefined, isLost: false, setVdi: async (/** @type {any} */ _, /** @type {() => boolean} */ isWanted) => isWanted(),
+                  setCamera(/** @type {any} */ camera) { this.camera = camera; }};
+  /** @type {any} */
+  const page = Object.create(Page.prototype);
+  Object.assign(page, {viewer, frame: 0, request: 0, plays: 0, showFacts: () => {}, showView: () => {}});
+  page.live = {live: {state: "live", isHeldBack: () => false}, close() { this.live.state = "closed"; }};
+  return {page, viewer, message: () => byId("message").hidden ? "" : byId("message").textContent};
+}
+
+/** A VDI made from this place. */
+const vdiFrom = (/** @type {number} */ x) => ({camera: {...CAMERA, position: [x, 0, 5]}, coloring: undefined, timeStep: 0, time: 0});
+
+async function testFollowing() {
+  const {page, viewer} = pageOf();
+  const seen = () => viewer.camera.position[0];
+  const give = async (/** @type {number} */ x) => page.takeLevel(vdiFrom(x), {frame: x});
+  await give(0);
+  await give(1);
+  check(seen() === 1, "a view that hasn't moved follows a server's VDIs");
+  page.setCamera({...CAMERA, position: [50, 0, 5]});
+  await give(2);
+  check(seen() === 50, "a view that has moved stays");
+  page.goHome();
+  for (let x = 3; x < 9; ++x) {  // VDIs come faster than the motion ends
+    clock.pass(100);
+    await give(x);
+  }
+  clock.pass(1000);
+  check(seen() === 8, `As made reaches the newest VDI's viewpoint: ${seen()}`);
+  await give(9);
+  check(seen() === 9, "and follows it afterwards");
+  page.setCamera({...CAMERA, position: [50, 0, 5]});
+  page.goHome();
+  clock.pass(100);
+  page.setCamera({...CAMERA, position: [60, 0, 5]});
+  await give(10);
+  clock.pass(1000);
+  check(seen() === 60, "a user who moves the view ends the motion");
+
+  // Files, and a page that `vdi export` makes.
+  page.live = undefined;
+  page.source = {count: 3, nameOf: () => "", load: async (/** @type {number} */ frame) => vdiFrom(frame)};
+  page.setCamera(page.vdi.camera);
+  await page.show(0);
+  await page.show(1);
+  check(seen() === 1, `a view that hasn't moved follows a file's VDIs: ${seen()}`);
+  page.setCamera({...CAMERA, position: [50, 0, 5]});
+  await page.show(2);
+  check(seen() === 50, "a view that has moved stays while files change");
+}
+
 testRest();
 await testScreenshot();
 testRoll();
@@ -316,5 +375,6 @@ testPan();
 testNumbers();
 testNumbersOfThePanel();
 testRangeUpwards();
+await testFollowing();
 console.log(failures === 0 ? "all well" : `${failures} failures`);
 process.exit(failures === 0 ? 0 : 1);
