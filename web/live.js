@@ -322,6 +322,10 @@ export class Live {
       acknowledge(this.acknowledged);
       return;
     }
+    if (this.isUnwanted(level.frame)) {
+      acknowledge(level.bytes);
+      return;
+    }
     const arrived = {...level, madeAt: this.madeAt, session: this.session};
     const load = () => this.options.decode(file);
     if (this.isHeldBack(arrived)) {
@@ -336,6 +340,16 @@ export class Live {
       if (socket === this.socket) acknowledge(level.bytes);
     };
     this.enqueue({level: arrived, load, done});
+  }
+
+  /**
+   * Whether the user has chosen another frame, which will come. A server sends the newest one first.
+   * @param {number} frame
+   */
+  isUnwanted(frame) {
+    const {wanted} = this;
+    const isThere = wanted !== null && wanted < (this.series?.steps.length ?? 0);
+    return isThere && this.missed !== wanted && frame !== wanted;
   }
 
   /**

@@ -332,6 +332,35 @@ async function testSeries() {
   live.close();
 }
 
+/** After a reconnect, a server sends the newest frame before it hears of the chosen one. */
+async function testChosenFrame() {
+  const {live, sockets, shown} = connection();
+  sockets[0].open();
+  sockets[0].text(welcome);
+  live.show(1);
+  sendLevel(sockets[0], 1, 1, 11);
+  await soon(20);
+  sockets[0].end(1006);
+  live.connect();
+  sockets[1].open();
+  sockets[1].text(welcome);
+  sendLevel(sockets[1], 2, 1, 21);
+  await soon(20);
+  check(shown.join() === "11" && live.shown?.frame === 1, `the newest frame isn't shown in place of the chosen one: ${shown}`);
+  check(sockets[1].sent.some((m) => m.type === "ack" && m.frame === 2 && m.bytes === 4), "but it is acknowledged");
+  sendLevel(sockets[1], 1, 1, 12);
+  sockets[1].text({type: "missing", frame: 1, cause: "gone"});
+  await soon(20);
+  sendLevel(sockets[1], 2, 1, 22);
+  await soon(20);
+  check(shown.join() === "11,12,22", `the newest frame in place of one that is gone: ${shown}`);
+  live.wanted = 7;
+  sendLevel(sockets[1], 2, 1, 23);
+  await soon(20);
+  check(shown.pop() === 23, "the newest frame while the series hasn't the chosen one");
+  live.close();
+}
+
 /** A pause keeps the frame on show, and stops the server once that frame is full or can't become so. */
 async function testPause() {
   const {live, sockets, shown} = connection();
@@ -580,6 +609,7 @@ await testConnection();
 await testSilence();
 await testLateDecoder();
 await testSeries();
+await testChosenFrame();
 await testPause();
 await testEndedRun();
 await testLostSource();
