@@ -44,6 +44,7 @@ function colorOf(hex) {
 }
 
 const MOTION_MS = 350;
+const NOTICE_MS = 5000;   // time for reading that a file can't be opened, over a server's frames
 const FRAMES_PER_SECOND = 10;
 
 /** The settings in the URL's fragment. */
@@ -71,6 +72,10 @@ export class Page {
     /** Counts requests for frames. A late answer to an older request is dropped. */
     this.request = 0;
     this.ownBackground = false;
+    /** @type {Promise<void> | undefined} of files that are being opened */
+    this.opening = undefined;
+    /** What a file is to be blamed for, while a server's frames go on. */
+    this.notice = "";
     /** @type {Camera | undefined} the last camera of a motion to the VDI's viewpoint that isn't over */
     this.homeward = undefined;
     this.viewer.onRest = () => {
@@ -156,13 +161,23 @@ export class Page {
   /** @param {File[]} files */
   async openFiles(files) {
     if (files.length === 0) return;
-    this.live?.close();
-    await this.open(filesSource(files, this.decoder));
+    const opening = this.open(filesSource(files, this.decoder));
+    this.opening = opening;
+    await opening;
+    if (this.opening !== opening) return;
+    this.opening = undefined;
+    if (this.source || !this.live) return;
+    const notice = this.notice = element("message").textContent ?? "";
+    setTimeout(() => {
+      if (this.notice !== notice) return;
+      this.notice = "";
+      if (element("message").textContent === notice) tell("");
+    }, NOTICE_MS);
   }
 
   /**
-   * Shows a source's first frame from the viewpoint at which it was made. If that fails, the former
-   * frame stays.
+   * Shows a source's first frame from the viewpoint at which it was made, and leaves the server. If
+   * that fails, the former frame and the server stay.
    * @param {Source} source
    */
   async open(source) {
@@ -175,6 +190,7 @@ export class Page {
       if (this.source === source) this.source = before;
       return;
     }
+    this.live?.close();
     this.showSeries(first);
     if (before === undefined) this.takeUrl();
     else if (this.vdi) this.setCamera(this.vdi.camera, false);
@@ -216,17 +232,21 @@ export class Page {
    */
   async takeLevel(vdi, level) {
     const {viewer} = this;
-    const before = this.vdi;
     const live = this.live;
-    this.source = undefined;
     const isWanted = () => this.live === live && !this.source && !live?.live.isHeldBack(level);
-    if (!await viewer.setVdi(vdi, isWanted)) return false;
+    let isShown = false;
+    do {
+      while (this.opening) await this.opening;  // if no file is sound, the server's frames go on
+      if (live?.live.state === "closed") return false;
+      this.source = undefined;
+      isShown = await viewer.setVdi(vdi, isWanted);
+    } while (!isShown && this.opening);
+    if (!isShown) return false;
+    const before = this.vdi;
     this.vdi = vdi;
     this.frame = level.frame;
-    if (!before) {
-      this.takeUrl();
-      if (!viewer.isLost) tell("");
-    }
+    if (!before) this.takeUrl();
+    if (!viewer.isLost && this.notice === "") tell("");
     this.follow(before);
     this.showFacts([]);
     showLegend(element("legend"), vdi.coloring);

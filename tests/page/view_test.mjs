@@ -321,13 +321,14 @@ function pageOf() {
                   setCamera(/** @type {any} */ camera) { this.camera = camera; }};
   /** @type {any} */
   const page = Object.create(Page.prototype);
-  Object.assign(page, {viewer, frame: 0, request: 0, plays: 0, showFacts: () => {}, showView: () => {}});
+  Object.assign(page, {viewer, frame: 0, request: 0, plays: 0, notice: "", showFacts: () => {}, showView: () => {}});
   page.live = {live: {state: "live", isHeldBack: () => false}, close() { this.live.state = "closed"; }};
   return {page, viewer, message: () => byId("message").hidden ? "" : byId("message").textContent};
 }
 
 /** A VDI made from this place. */
-const vdiFrom = (/** @type {number} */ x) => ({camera: {...CAMERA, position: [x, 0, 5]}, coloring: undefined, timeStep: 0, time: 0});
+const vdiFrom = (/** @type {number} */ x) => ({camera: {...CAMERA, position: [x, 0, 5]}, coloring: undefined, timeStep: 0, time: 0,
+                                              segments: {byteLength: 0}, heads: {byteLength: 0}});
 
 async function testFollowing() {
   const {page, viewer} = pageOf();
@@ -368,6 +369,52 @@ async function testFollowing() {
   check(seen() === 50, "a view that has moved stays while files change");
 }
 
+/** A wrong file that is dropped onto a server's page. */
+async function testWrongFile() {
+  const {page, viewer, message} = pageOf();
+  const drop = (/** @type {string} */ name) => page.openFiles([{name, arrayBuffer: async () => new ArrayBuffer(8)}]);
+  let isSound = false;
+  page.decoder = {decode: async () => {
+    if (!isSound) throw new Error("invalid .vdi file: it is too short");
+    return vdiFrom(70);
+  }};
+  await page.takeLevel(vdiFrom(0), {frame: 0});
+  let wrong = drop("photo.png");
+  const level = page.takeLevel(vdiFrom(1), {frame: 1});
+  await wrong;
+  check(message().includes("invalid .vdi file"), `a wrong file: ${message()}`);
+  check(await level && page.frame === 1 && page.live.live.state === "live" && !page.source, "the server's frames go on");
+  check(message().includes("invalid .vdi file"), "the message can be read");
+  clock.pass(6000);
+  check(message() === "", `the message goes: ${message()}`);
+
+  // While a level is on its way to the GPU.
+  const {setVdi} = viewer;
+  let arrive = () => {};
+  viewer.setVdi = async (/** @type {any} */ vdi, /** @type {() => boolean} */ isWanted) => {
+    await new Promise((resolve) => arrive = () => resolve(0));
+    return setVdi(vdi, isWanted);
+  };
+  const next = page.takeLevel(vdiFrom(2), {frame: 2});
+  await 0;
+  viewer.setVdi = setVdi;
+  wrong = drop("photo.png");
+  arrive();
+  await wrong;
+  check(await next && page.frame === 2, "a level that was on its way is shown after all");
+
+  isSound = true;
+  await drop("sound.vdi");
+  check(page.live.live.state === "closed" && page.source && viewer.camera.position[0] === 70, "a sound file takes the server's place");
+  check(!await page.takeLevel(vdiFrom(3), {frame: 3}), "and no late level that of the file");
+  page.live.live.state = "waiting";
+  page.notice = "";
+  document.getElementById("message").textContent = "a failure";
+  document.getElementById("message").hidden = false;
+  await page.takeLevel(vdiFrom(4), {frame: 4});
+  check(message() === "" && !page.source, "a frame takes the place of an earlier message");
+}
+
 testRest();
 await testScreenshot();
 testRoll();
@@ -376,5 +423,6 @@ testNumbers();
 testNumbersOfThePanel();
 testRangeUpwards();
 await testFollowing();
+await testWrongFile();
 console.log(failures === 0 ? "all well" : `${failures} failures`);
 process.exit(failures === 0 ? 0 : 1);
