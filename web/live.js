@@ -105,7 +105,8 @@ export class Live {
     /** @type {Pending | undefined} the newest level that waits for the decoder */
     this.waiting = undefined;
     /**
-     * The newest level that a pause has kept off the screen. The server won't send it again.
+     * The newest level that a pause, or the choice of another frame, has kept off the screen. The
+     * server won't send it again.
      * @type {Pending | undefined}
      */
     this.heldBack = undefined;
@@ -302,6 +303,11 @@ export class Live {
   /** @param {number} frame one that can't be shown @param {string} cause */
   miss(frame, cause) {
     if (frame === this.wanted) this.missed = frame;
+    const {heldBack} = this;
+    if (heldBack && !this.shown) {  // better than nothing
+      this.heldBack = undefined;
+      this.enqueue(heldBack);
+    }
     this.change(this.state, cause);
   }
 
@@ -322,13 +328,10 @@ export class Live {
       acknowledge(this.acknowledged);
       return;
     }
-    if (this.isUnwanted(level.frame)) {
-      acknowledge(level.bytes);
-      return;
-    }
     const arrived = {...level, madeAt: this.madeAt, session: this.session};
     const load = () => this.options.decode(file);
-    if (this.isHeldBack(arrived)) {
+    if (level.frame === this.wanted) this.heldBack = undefined;  // the server will send the newest one again
+    if (this.isUnwanted(level.frame) || this.isHeldBack(arrived)) {
       acknowledge(level.bytes);
       this.heldBack = {level: arrived, load};
       return;
