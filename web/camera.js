@@ -95,7 +95,8 @@ export function pixelSizeOf(header) {
 }
 
 /**
- * The matrix from world coordinates to WebGL's clip space. It doesn't resolve depth.
+ * The matrix from world coordinates, less the camera's position, to WebGL's clip space. It doesn't
+ * resolve depth. Far from the origin, single precision wouldn't resolve a pixel in world coordinates.
  * @param {Camera} camera
  * @param {[number, number]} extent half the canvas' width and height, in the camera's half heights
  * @returns {Float32Array} 16 numbers, by columns
@@ -107,13 +108,11 @@ export function clipMatrix(camera, extent) {
   const matrix = new Float32Array(16);
   rows.forEach((axis, row) => {
     for (let column = 0; column < 3; ++column) matrix[4 * column + row] = axis[column];
-    matrix[12 + row] = -dot(axis, camera.position);
   });
   if (camera.parallel) {
     matrix[15] = 1;
   } else {
     for (let column = 0; column < 3; ++column) matrix[4 * column + 3] = forward[column];
-    matrix[15] = -dot(forward, camera.position);
   }
   return matrix;
 }
@@ -185,16 +184,28 @@ export function panned(camera, dx, dy) {
   return {...camera, position: plus(camera.position, step), focalPoint: plus(camera.focalPoint, step)};
 }
 
+/** @param {Vec3[]} points */
+function largestCoordinate(...points) {
+  return Math.max(...points.flat().map(Math.abs));
+}
+
+const NEAREST_SHARE = 1e-5;     // of the scene's diagonal
+const SHARPEST_SHARE = 1e-10;   // of the largest coordinate, of which double precision holds 1e-16
+
 /**
- * Magnifies the picture by `factor`. In perspective the camera moves closer.
+ * Magnifies the picture by `factor`. In perspective the camera moves closer, but stays at a
+ * distance from the focal point that numbers resolve.
  * @param {Camera} camera
  * @param {number} factor > 0
+ * @param {number} diagonal of the scene
  * @returns {Camera}
  */
-export function zoomed(camera, factor) {
-  if (camera.parallel) return {...camera, parallelScale: camera.parallelScale / factor};
-  const back = times(1 / factor, minus(camera.position, camera.focalPoint));
-  return {...camera, position: plus(camera.focalPoint, back)};
+export function zoomed(camera, factor, diagonal) {
+  const least = Math.max(NEAREST_SHARE * diagonal, SHARPEST_SHARE * largestCoordinate(camera.focalPoint));
+  const limited = (/** @type {number} */ extent) => Math.max(extent / factor, Math.min(extent, least));
+  if (camera.parallel) return {...camera, parallelScale: limited(camera.parallelScale)};
+  const back = minus(camera.position, camera.focalPoint);
+  return {...camera, position: plus(camera.focalPoint, times(limited(length(back)), normalize(back)))};
 }
 
 /**
@@ -221,14 +232,24 @@ export function between(a, b, share) {
   };
 }
 
+const DIGITS = 7;         // those of single precision
+const MOST_DIGITS = 17;   // those of double precision
+
 /**
- * A camera as text for a URL. Numbers have the digits of single precision.
+ * A camera as text for a URL. Numbers have the digits of single precision, and places more where
+ * the coordinates are large beside what the camera sees.
  * @param {Camera} camera
  */
 export function cameraText(camera) {
-  const numbers = [...camera.position, ...camera.focalPoint, ...camera.viewUp,
-                   camera.parallel ? camera.parallelScale : camera.viewAngle];
-  return (camera.parallel ? "parallel," : "") + numbers.map((n) => String(Number(n.toPrecision(7)))).join(",");
+  const {position, focalPoint, viewUp, parallel, parallelScale, viewAngle} = camera;
+  const distance = length(minus(position, focalPoint));
+  const share = largestCoordinate(position, focalPoint) / (parallel ? Math.min(distance, parallelScale) : distance);
+  const more = Math.max(Math.floor(Math.log10(share)), 0);
+  const digits = Math.min(Number.isFinite(more) ? DIGITS + more : MOST_DIGITS, MOST_DIGITS);
+  const text = (/** @type {number} */ n, /** @type {number} */ most) => String(Number(n.toPrecision(most)));
+  const words = [...[...position, ...focalPoint].map((n) => text(n, digits)),
+                 ...[...viewUp, parallel ? parallelScale : viewAngle].map((n) => text(n, DIGITS))];
+  return (parallel ? "parallel," : "") + words.join(",");
 }
 
 /**

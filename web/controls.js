@@ -14,6 +14,7 @@ const KEY_ZOOM = 1.1;
  * @typedef {object} Hand the camera that the controls move
  * @property {() => Camera | undefined} camera
  * @property {() => Vec3} center point that the camera orbits
+ * @property {() => number} diagonal of the scene
  * @property {() => number} framed share of the element's height that the camera's vertical extent takes
  * @property {(camera: Camera) => void} move
  */
@@ -61,7 +62,7 @@ function addPointers(element, hand) {
     const box = element.getBoundingClientRect();
     const dx = (to.x - from.x) / box.height, dy = (to.y - from.y) / box.height;
     if (drag === "pan") return pannedBy(camera, to.x - from.x, to.y - from.y);
-    if (drag === "zoom") return zoomed(camera, Math.exp(-2 * dy));
+    if (drag === "zoom") return zoomed(camera, Math.exp(-2 * dy), hand.diagonal());
     if (drag === "orbit") return orbited(camera, hand.center(), -dx * DEGREES_PER_HEIGHT, dy * DEGREES_PER_HEIGHT);
     const middle = {x: box.left + box.width / 2, y: box.top + box.height / 2};
     return rolled(camera, degreesAround(middle, from, to));
@@ -78,7 +79,7 @@ function addPointers(element, hand) {
     const before = {x: from.x - fixed.x, y: from.y - fixed.y}, after = {x: to.x - fixed.x, y: to.y - fixed.y};
     const factor = Math.hypot(after.x, after.y) / Math.max(Math.hypot(before.x, before.y), 1);
     const moved = pannedBy(camera, (to.x - from.x) / 2, (to.y - from.y) / 2);
-    return rolled(zoomed(moved, Math.min(Math.max(factor, 0.5), 2)), degreesAround(fixed, from, to));
+    return rolled(zoomed(moved, Math.min(Math.max(factor, 0.5), 2), hand.diagonal()), degreesAround(fixed, from, to));
   };
 
   element.addEventListener("pointerdown", (event) => {
@@ -100,16 +101,17 @@ function addPointers(element, hand) {
   element.addEventListener("contextmenu", (event) => event.preventDefault());
 }
 
-/** @param {KeyboardEvent} event @param {Camera} camera @param {Vec3} center @returns {Camera | undefined} */
-function keyed(event, camera, center) {
+/** @param {KeyboardEvent} event @param {Camera} camera @param {Hand} hand @returns {Camera | undefined} */
+function keyed(event, camera, hand) {
   const step = event.shiftKey;
+  const center = hand.center();
   switch (event.key) {
     case "ArrowLeft": return step ? panned(camera, -KEY_PAN, 0) : orbited(camera, center, -KEY_DEGREES, 0);
     case "ArrowRight": return step ? panned(camera, KEY_PAN, 0) : orbited(camera, center, KEY_DEGREES, 0);
     case "ArrowUp": return step ? panned(camera, 0, KEY_PAN) : orbited(camera, center, 0, KEY_DEGREES);
     case "ArrowDown": return step ? panned(camera, 0, -KEY_PAN) : orbited(camera, center, 0, -KEY_DEGREES);
-    case "+": case "=": return zoomed(camera, KEY_ZOOM);
-    case "-": case "_": return zoomed(camera, 1 / KEY_ZOOM);
+    case "+": case "=": return zoomed(camera, KEY_ZOOM, hand.diagonal());
+    case "-": case "_": return zoomed(camera, 1 / KEY_ZOOM, hand.diagonal());
     case "[": return rolled(camera, KEY_DEGREES);
     case "]": return rolled(camera, -KEY_DEGREES);
     default: return undefined;
@@ -123,12 +125,12 @@ export function addControls(element, hand) {
     event.preventDefault();
     const camera = hand.camera();
     const lines = event.deltaMode === 0 ? event.deltaY / 100 : event.deltaMode === 1 ? event.deltaY / 3 : event.deltaY;
-    if (camera) hand.move(zoomed(camera, Math.exp(-0.15 * Math.min(Math.max(lines, -5), 5))));
+    if (camera) hand.move(zoomed(camera, Math.exp(-0.15 * Math.min(Math.max(lines, -5), 5)), hand.diagonal()));
   }, {passive: false});
   element.addEventListener("keydown", (event) => {
     const camera = hand.camera();
     if (!camera || event.ctrlKey || event.altKey || event.metaKey) return;
-    const next = keyed(event, camera, hand.center());
+    const next = keyed(event, camera, hand);
     if (!next) return;
     event.preventDefault();
     hand.move(next);

@@ -8,6 +8,7 @@ import {showLegend} from "./legend.js";
 import {LivePanel, takeToken} from "./livepanel.js";
 import {SteerPanel} from "./steerpanel.js";
 import {embeddedSource, filesSource} from "./sources.js";
+import {length, minus} from "./vector.js";
 import {Viewer} from "./viewer.js";
 
 /** @typedef {import("./format.js").Camera} Camera */
@@ -91,6 +92,7 @@ export class Page {
     addControls(element("view"), {
       camera: () => viewer.camera,
       center: () => this.orbitCenter(),
+      diagonal: () => this.diagonal(),
       framed: () => viewer.renderer.framedHeight() / viewer.canvas.height,
       move: (camera) => this.setCamera(camera),
     });
@@ -156,6 +158,13 @@ export class Page {
     const inside = focal.every((f, axis) => f >= vdi.bounds[0][axis] && f <= vdi.bounds[1][axis]);
     const middle = centerOf(vdi.bounds);
     return inside || !middle.every(Number.isFinite) ? focal : middle;
+  }
+
+  /** The scene's; 0 without one. */
+  diagonal() {
+    const {vdi} = this;
+    const diagonal = vdi ? length(minus(vdi.bounds[1], vdi.bounds[0])) : 0;
+    return Number.isFinite(diagonal) ? diagonal : 0;
   }
 
   /** @param {File[]} files */

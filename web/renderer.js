@@ -22,9 +22,9 @@ void main() { color = texture(picture, min(gl_FragCoord.xy / canvasSize * part, 
 
 const LINES = `#version 300 es
 uniform mat4 clip;
-in vec3 world;
+in vec3 offset;
 void main() {
-  gl_Position = clip * vec4(world, 1.0);
+  gl_Position = clip * vec4(offset, 1.0);
   gl_Position.z = 0.0;
 }
 `;
@@ -43,19 +43,19 @@ const EDGES = [0, 1, 2].flatMap((axis) => [0, 1, 2, 3].map((i) => {
   return {from, to: from | (1 << axis), faces: [2 * u + (i & 1), 2 * v + (i >> 1)]};
 }));
 
-/** @param {[Vec3, Vec3]} bounds @param {number} corner */
-function cornerOf(bounds, corner) {
-  return [0, 1, 2].map((axis) => bounds[(corner >> axis) & 1][axis]);
+/** @param {[Vec3, Vec3]} bounds @param {number} corner @param {Vec3} origin */
+function cornerOf(bounds, corner, origin) {
+  return [0, 1, 2].map((axis) => bounds[(corner >> axis) & 1][axis] - origin[axis]);
 }
 
 /**
- * Edges of the box as ends of lines. An edge is in front if one of its faces looks at the camera.
+ * Edges of the box as ends of lines, from the camera's position. An edge is in front if one of its faces looks at the camera.
  * All material in the box is behind it.
  * @param {[Vec3, Vec3]} bounds
  * @param {Camera} camera
  * @param {boolean} inFront
  */
-function outlineEnds(bounds, camera, inFront) {
+export function outlineEnds(bounds, camera, inFront) {
   const forward = basisOf(camera).forward;
   const seesFace = (/** @type {number} */ face) => {
     const axis = face >> 1, sign = (face & 1) === 1 ? 1 : -1;
@@ -63,7 +63,7 @@ function outlineEnds(bounds, camera, inFront) {
     return sign * towards > 0;
   };
   return EDGES.filter((edge) => edge.faces.some(seesFace) === inFront)
-              .flatMap((edge) => [...cornerOf(bounds, edge.from), ...cornerOf(bounds, edge.to)]);
+              .flatMap((edge) => [...cornerOf(bounds, edge.from, camera.position), ...cornerOf(bounds, edge.to, camera.position)]);
 }
 
 /** @typedef {{vdi: PreparedVdi, textures: (WebGLTexture | null)[], uploads: (() => void)[]}} Loaded */
@@ -391,7 +391,7 @@ export class Renderer {
     gl.useProgram(lines.program);
     gl.bindBuffer(gl.ARRAY_BUFFER, ends);
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(points), gl.DYNAMIC_DRAW);
-    const attribute = gl.getAttribLocation(lines.program, "world");
+    const attribute = gl.getAttribLocation(lines.program, "offset");
     gl.enableVertexAttribArray(attribute);
     gl.vertexAttribPointer(attribute, 3, gl.FLOAT, false, 0, 0);
     const framed = this.framedHeight();

@@ -1,8 +1,9 @@
 // What the page does with hands, pictures and numbers, without a browser: elements, renderer and clock are
 // this test's.
-import {toView, basisOf, halfHeightOf} from "../../web/camera.js";
+import {basisOf, cameraOfText, cameraText, clipMatrix, halfHeightOf, orbited, panned, toView, zoomed} from "../../web/camera.js";
 import {addControls} from "../../web/controls.js";
 import {numberText} from "../../web/legend.js";
+import {outlineEnds} from "../../web/renderer.js";
 import {SteerPanel, steppedValue} from "../../web/steerpanel.js";
 import {Viewer} from "../../web/viewer.js";
 
@@ -129,6 +130,9 @@ async function testScreenshot() {
   check(isWhole(),
         `a screenshot's picture stays, and no strips are put into an older one: ${new Set(renderer.shown).size} kinds of rows`);
   check(rests() === 1, `the view rests once after a screenshot: ${rests()} times`);
+  viewer.isLost = true;
+  const refused = await viewer.screenshot().then(() => "", (/** @type {Error} */ error) => error.message);
+  check(refused.includes("lost the picture"), `no screenshot of a lost picture: ${refused}`);
 }
 
 /** An element of this size, hands on it, and where the camera sees a point of the world. */
@@ -199,6 +203,51 @@ function testPan() {
   wide.point("pointerdown", 1, 100, 200, {button: 1});
   wide.point("pointermove", 1, 130, 180);
   check(isNear(wide.place([0, 0, 0]), 230, 130), `material follows a mouse in a wide window: ${wide.place([0, 0, 0])}`);
+}
+
+/** However far a user zooms in, the view can be kept in a link, and goes on from there. */
+function testZoom() {
+  for (const focalPoint of [[0, 0, 0], [5, -3, 2], [448000, 5411000, 100]]) {
+    for (const more of [{}, {parallel: true, parallelScale: 40}]) {
+      let camera = {...CAMERA, ...more, focalPoint, position: [focalPoint[0] + 200, focalPoint[1] + 100, focalPoint[2] + 50]};
+      for (let i = 0; i < 2000; ++i) camera = zoomed(camera, 1.1, 173);
+      const kept = cameraOfText(cameraText(camera), camera);
+      check(kept !== undefined && cameraText(kept) === cameraText(camera), `a view from near ${focalPoint}: ${cameraText(camera)}`);
+      const turned = orbited(camera, camera.focalPoint, 5, 0);
+      check(cameraText(turned) !== cameraText(camera), `a near view of ${focalPoint} turns`);
+      const far = zoomed(camera, 1e-6, 173);
+      check(toView(far.focalPoint, far, basisOf(far))[2] > 100 || far.parallelScale > 100, `and comes back: ${cameraText(far)}`);
+    }
+  }
+  const near = {...CAMERA, position: [0, 0, 1e-9]};
+  check(Math.abs(zoomed(near, 2, 1).position[2] - 1e-9) < 1e-12, "a view that is nearer already stays");
+}
+
+/** Far from the origin, as in a map's coordinates: metres in millions. */
+function testFarFromTheOrigin() {
+  /** @type {any} */
+  const camera = {...CAMERA, focalPoint: [448050, 5411050, 150], position: [448350, 5411250, 250]};
+  check(cameraText(panned(camera, 1e-4, 0)) !== cameraText(camera), "a pan by a tenth of a pixel is a motion");
+  const kept = cameraOfText(cameraText(camera), camera);
+  check(kept !== undefined && kept.position.every((value, i) => Math.abs(value - camera.position[i]) < 1e-3), "a link keeps the place");
+  const bounds = /** @type {any} */ ([[448000, 5411000, 100], [448100.3, 5411100.3, 200.3]]);
+  const ends = new Float32Array([...outlineEnds(bounds, camera, true), ...outlineEnds(bounds, camera, false)]);
+  const matrix = clipMatrix(camera, [1.6, 1]);
+  const pixels = 500;  // half the picture's height
+  let worst = 0;
+  for (const x of [0, 1]) for (const y of [0, 1]) for (const z of [0, 1]) {
+    const [right, up, depth] = toView([bounds[x][0], bounds[y][1], bounds[z][2]], camera, basisOf(camera));
+    const place = [right, up].map((value) => pixels * value / depth / halfHeightOf(camera));
+    let nearest = Infinity;
+    for (let i = 0; i < ends.length; i += 3) {
+      const row = (/** @type {number} */ r) =>
+        Math.fround(matrix[r] * ends[i] + matrix[4 + r] * ends[i + 1] + matrix[8 + r] * ends[i + 2] + matrix[12 + r]);
+      const drawn = [1.6 * pixels * row(0) / row(3), pixels * row(1) / row(3)];
+      nearest = Math.min(nearest, Math.hypot(drawn[0] - place[0], drawn[1] - place[1]));
+    }
+    worst = Math.max(worst, nearest);
+  }
+  check(worst < 0.01, `the outline is off by ${worst} pixels`);
 }
 
 function testNumbers() {
@@ -419,6 +468,8 @@ testRest();
 await testScreenshot();
 testRoll();
 testPan();
+testZoom();
+testFarFromTheOrigin();
 testNumbers();
 testNumbersOfThePanel();
 testRangeUpwards();
