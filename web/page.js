@@ -436,6 +436,16 @@ export class Page {
   }
 }
 
+/** Lets keys move the view from the start. A ring around the view would tell nothing then. */
+function takeFocus() {
+  const {activeElement} = document;
+  const view = element("view");
+  if (window.parent !== window || (activeElement && activeElement !== document.body)) return;
+  view.classList.add("quiet");
+  view.addEventListener("blur", () => view.classList.remove("quiet"), {once: true});
+  view.focus({preventScroll: true});
+}
+
 function main() {
   let page;
   try {
@@ -444,6 +454,7 @@ function main() {
     tell(messageOf(error));
     return;
   }
+  takeFocus();
   Object.assign(window, {vdiPage: page});  // for scripts and tests
   /** @type {HTMLElement[]} */
   const frames = [...document.querySelectorAll("script.vdi-frame")].map((frame) => /** @type {HTMLElement} */ (frame));

@@ -254,6 +254,7 @@ export class Viewer {
   screenshot() {
     const {renderer, canvas} = this;
     if (!this.camera) return Promise.reject(new Error("there is no picture yet"));
+    if (this.isLost) return Promise.reject(new Error("the graphics driver has lost the picture"));
     renderer.drawPicture(this.camera, 1, 0, canvas.height, renderer.canShear());
     renderer.finishPicture();
     this.refresh();

@@ -415,6 +415,24 @@ def test_looks(browser):
     browser.size(WIDTH, HEIGHT)
 
 
+def test_first_look(browser):
+    """Keys work from the start, and in a narrow window the colour bar is below the header."""
+    browser.size(320, 568)
+    open_page(browser, "step_0.html")
+    whole(browser)
+    before = camera_of(browser)
+    browser.key("ArrowLeft")
+    check(camera_of(browser) != before, "an arrow turns a page that was only opened")
+    gap = browser.value("""(() => {
+      const [header, legend] = [document.querySelector('header'), document.getElementById('legend')];
+      document.getElementById('facts').textContent = 'a long line of facts '.repeat(9);
+      [legend.hidden, legend.textContent] = [false, 'velocity'];
+      return legend.getBoundingClientRect().top - header.getBoundingClientRect().bottom;
+    })()""")
+    check(gap >= 0, f"the colour bar is {gap} pixels below the header")
+    browser.size(WIDTH, HEIGHT)
+
+
 def test_network(browser):
     """The page asks for nothing but itself, and allows nothing else."""
     asked = {event["params"]["request"]["url"] for event in browser.events
@@ -427,4 +445,4 @@ if sys.argv[4:] == ["speed"]:
     run(test_frame_time)
 run(test_pictures, test_culling_perspective, test_culling_parallel, test_small_textures, test_hands,
     test_narrow_window, test_screenshot, test_damage, test_without_webgl, test_series, test_legend, test_looks,
-    test_network)
+    test_first_look, test_network)

@@ -145,7 +145,7 @@ function handsOn(/** @type {number} */ width, /** @type {number} */ height, /** 
   };
   let camera = CAMERA;
   addControls(/** @type {any} */ (element), /** @type {any} */ ({
-    camera: () => camera, center: () => [0, 0, 0], framed: () => framed,
+    camera: () => camera, center: () => [0, 0, 0], diagonal: () => 1, framed: () => framed,
     move: (/** @type {any} */ next) => camera = next,
   }));
   /** @param {string} name @param {number} id @param {number} x @param {number} y */
