@@ -26,14 +26,28 @@ std::string numberAt(const std::string& text, std::size_t& at) {
   return text.substr(begin, at - begin);
 }
 
-/// Whether it is a link to a file of the same folder, such as latest.vdi.
+/// Whether it is a link to a file of the same folder, such as latest.vdi, at once or by way of other links.
 bool isAnotherName(const std::filesystem::directory_entry& entry) {
-  std::error_code none;
-  const std::filesystem::path target = std::filesystem::read_symlink(entry.path(), none);
-  return !none && !target.has_parent_path();
+  std::error_code error;
+  const std::filesystem::path target = std::filesystem::read_symlink(entry.path(), error);
+  if (error) return false;
+  if (!target.has_parent_path()) return true;
+  const std::filesystem::path folder = std::filesystem::canonical(entry.path().parent_path(), error);
+  if (error) return false;
+  const std::filesystem::path next = folder / target;  // the target alone if it is absolute
+  if (std::filesystem::weakly_canonical(next.parent_path(), error) == folder && !error) return true;
+  return std::filesystem::weakly_canonical(next, error).parent_path() == folder && !error;
 }
 
 }  // namespace
+
+std::optional<FileLook> lookAt(const std::filesystem::path& file) {
+  std::error_code noSize;
+  std::error_code noTime;
+  const FileLook look{std::filesystem::file_size(file, noSize),
+                      std::filesystem::last_write_time(file, noTime)};
+  return noSize || noTime ? std::nullopt : std::optional(look);
+}
 
 bool comesBefore(const std::string& a, const std::string& b) {
   std::size_t i = 0;
@@ -78,19 +92,18 @@ std::vector<std::filesystem::path> FolderWatch::changed() {
     watch();  // before the listing, so that no file appears unseen in between
   }
   std::vector<std::filesystem::path> files;
-  std::map<std::filesystem::path, Look> seen;
+  std::map<std::filesystem::path, FileLook> seen;
   std::error_code error;
   std::filesystem::directory_iterator entries(folder_, error);
   for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
     const std::filesystem::path& file = entries->path();
     if (file.extension() != ".vdi" || file.filename().string().starts_with('.')) continue;
     if (isAnotherName(*entries)) continue;
-    std::error_code gone;  // the file may vanish between two listings
-    const Look look{std::filesystem::file_size(file, gone), std::filesystem::last_write_time(file, gone)};
-    if (gone) continue;
+    const std::optional<FileLook> look = lookAt(file);
+    if (!look) continue;  // the file may vanish between two listings
     const auto before = known_.find(file);
-    if (before == known_.end() || before->second != look) files.push_back(file);
-    seen.emplace(file, look);
+    if (before == known_.end() || before->second != *look) files.push_back(file);
+    seen.emplace(file, *look);
   }
   if (error) throw Error(ErrorCode::Io, "can't read the folder: " + error.message(), folder_.string());
   known_ = std::move(seen);

@@ -6,12 +6,22 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "vdi/core/Descriptor.h"
 
 namespace vdi::apps {
+
+/// What tells that a file has changed, without reading it.
+struct FileLook {
+  std::uintmax_t size = 0;
+  std::filesystem::file_time_type time;
+  bool operator==(const FileLook&) const = default;
+};
+/// nullopt if the file is gone.
+std::optional<FileLook> lookAt(const std::filesystem::path& file);
 
 class FolderWatch {
  public:
@@ -29,16 +39,11 @@ class FolderWatch {
   std::vector<std::filesystem::path> changed();
 
  private:
-  struct Look {
-    std::uintmax_t size;
-    std::filesystem::file_time_type time;
-    bool operator==(const Look&) const = default;
-  };
   void watch() const;
 
   std::filesystem::path folder_;
   Descriptor descriptor_;
-  std::map<std::filesystem::path, Look> known_;
+  std::map<std::filesystem::path, FileLook> known_;
 };
 
 /// Orders "b2" before "b10".

@@ -32,6 +32,7 @@ stream::Clock::time_point writtenAt(const std::filesystem::path& file) {
 
 /// How long a program may take to write a file under its final name.
 constexpr std::chrono::seconds writingTime{1};
+constexpr char damagedOrGone[] = "the file is damaged or gone";
 
 int makeWakeup() {
   const int descriptor = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
@@ -139,31 +140,64 @@ void FrameFiles::tellIncomplete() {
   }
 }
 
+/// Throws Error as io::readVdiInfo does.
+FrameFiles::Content FrameFiles::contentOf(const std::filesystem::path& file) {
+  constexpr std::size_t headerBytes = 240;  // docs/format.md
+  Content content;
+  content.look = lookAt(file).value_or(FileLook());  // before reading, so that a later change shows
+  const Vdi header = io::readVdiInfo(file).header;
+  if (std::isfinite(header.time)) content.time = header.time;
+  content.step = header.timeStep;
+  content.header = io::InputFile(file).read(0, headerBytes);
+  return content;
+}
+
+/// The file's last entry, if that has this content, perhaps with another time; otherwise null.
+FrameFiles::Entry* FrameFiles::entryWith(const std::filesystem::path& file, const Content& content) {
+  const auto found = latest_.find(file);
+  if (found == latest_.end()) return nullptr;
+  Entry& entry = series_[found->second];
+  const bool isSame = entry.content.look.size == content.look.size && entry.content.header == content.header;
+  return isSame ? &entry : nullptr;
+}
+
 /// Adds all files to the series and shows the last complete one.
 void FrameFiles::add(const std::vector<std::filesystem::path>& files) {
   stream::Series entries;
+  std::size_t unshown = series_.size();
   for (const std::filesystem::path& file : files) {
     try {
-      const Vdi header = io::readVdiInfo(file).header;
-      entries.times.push_back(std::isfinite(header.time) ? std::optional(header.time) : std::nullopt);
-      entries.steps.push_back(header.timeStep);
-      series_.push_back(file);
+      Content content = contentOf(file);
+      if (Entry* const same = follows() ? entryWith(file, content) : nullptr) {
+        same->content = std::move(content);
+        if (!same->isDamaged) {
+          incomplete_.erase(file);
+        } else if (same == &series_.back()) {
+          unshown = series_.size() - 1;  // its lists may be sound now
+        }
+        continue;
+      }
+      entries.times.push_back(content.time);
+      entries.steps.push_back(content.step);
+      latest_[file] = static_cast<std::uint32_t>(series_.size());
+      series_.push_back({file, std::move(content)});
     } catch (const Error& error) {
       leaveOut(file, error.what());
     }
   }
-  const auto first = static_cast<std::uint32_t>(series_.size() - entries.size());
   if (entries.size() > 0) server_->append(std::move(entries));
   // A viewer that reads this knows all of the series.
   if (!follows()) server_->setPhase(stream::Phase::Ended);
-  for (auto index = static_cast<std::uint32_t>(series_.size()); index-- > first;) {
+  for (auto index = static_cast<std::uint32_t>(series_.size()); index-- > unshown;) {
     if (send(index, [this](stream::FramePtr frame) { server_->publish(std::move(frame)); })) return;
   }
 }
 
 /// Returns false if the file is bad or gone.
 bool FrameFiles::send(std::uint32_t index, const std::function<void(stream::FramePtr)>& take) {
-  const std::filesystem::path& file = series_[index];
+  Entry& entry = series_[index];
+  const std::filesystem::path& file = entry.file;
+  entry.isDamaged = true;
   try {
     std::vector<std::byte> bytes = io::InputFile(file).readAll();
     const stream::Clock::time_point made = writtenAt(file);
@@ -173,6 +207,7 @@ bool FrameFiles::send(std::uint32_t index, const std::function<void(stream::Fram
       throw Error(error.code(), error.what(), file.string());
     }
     incomplete_.erase(file);
+    entry.isDamaged = false;
     return true;
   } catch (const Error& error) {
     leaveOut(file, error.what());
@@ -180,8 +215,29 @@ bool FrameFiles::send(std::uint32_t index, const std::function<void(stream::Fram
   }
 }
 
+/// Why the file can't be the entry's any more; empty if it can. A file that is gone may still be kept.
+std::string FrameFiles::changeOf(Entry& entry) {
+  const std::optional<FileLook> look = lookAt(entry.file);
+  if (!look || *look == entry.content.look) return {};
+  try {
+    Content content = contentOf(entry.file);
+    if (content.look.size != entry.content.look.size || content.header != entry.content.header)
+      return "the file was replaced";
+    entry.content = std::move(content);
+    return {};
+  } catch (const Error&) {
+    return damagedOrGone;
+  }
+}
+
 void FrameFiles::provide(std::uint32_t index) {
   constexpr std::size_t mostKept = 4;
+  const std::string change = changeOf(series_[index]);
+  if (!change.empty()) {
+    kept_.remove_if([index](const stream::FramePtr& frame) { return frame->id == index; });
+    server_->miss({index, change});
+    return;
+  }
   const auto found = std::find_if(kept_.begin(), kept_.end(),
                                   [index](const stream::FramePtr& frame) { return frame->id == index; });
   if (found != kept_.end()) {
@@ -195,7 +251,7 @@ void FrameFiles::provide(std::uint32_t index) {
     server_->provide(std::move(frame));
   });
   if (!isSound) {
-    server_->miss({index, "the file is damaged or gone"});
+    server_->miss({index, damagedOrGone});
     return;
   }
   kept_.push_front(std::move(last));

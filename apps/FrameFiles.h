@@ -22,7 +22,8 @@
 namespace vdi::apps {
 
 /// Reads, checks and encodes files on a thread of its own, and passes them to a server as the
-/// frames of one series. A frame's id is its index in the series.
+/// frames of one series. A frame's id is its index in the series. A file that is replaced becomes a
+/// new frame, and the former one is missing. A file that was only touched stays the frame that it is.
 class FrameFiles {
  public:
   struct Options {
@@ -47,10 +48,26 @@ class FrameFiles {
   void show(std::uint32_t index);
 
  private:
+  struct Content {
+    FileLook look;
+    /// Tells one VDI from another, without reading their lists: it has a checksum of the table with
+    /// the checksums of all chunks.
+    std::vector<std::byte> header;
+    std::optional<double> time;
+    std::uint64_t step = 0;
+  };
+  struct Entry {
+    std::filesystem::path file;
+    Content content;
+    bool isDamaged = false;  // as far as it was read
+  };
+  static Content contentOf(const std::filesystem::path& file);
+  Entry* entryWith(const std::filesystem::path& file, const Content& content);
   void work();
   void look();
   void add(const std::vector<std::filesystem::path>& files);
   void provide(std::uint32_t index);
+  static std::string changeOf(Entry& entry);
   bool send(std::uint32_t index, const std::function<void(stream::FramePtr)>& take);
   bool follows() const { return watch_ && options_.follows; }
   void waitForWork();
@@ -60,8 +77,9 @@ class FrameFiles {
   Options options_;
   stream::Server* server_ = nullptr;
   std::optional<FolderWatch> watch_;
-  std::vector<std::filesystem::path> series_;
-  std::list<stream::FramePtr> kept_;  // the last few frames shown
+  std::vector<Entry> series_;
+  std::map<std::filesystem::path, std::uint32_t> latest_;  // the last entry of each file
+  std::list<stream::FramePtr> kept_;                       // the last few frames shown
   struct Incomplete {
     std::string what;
     stream::Clock::time_point since;  // the file's last change

@@ -90,6 +90,52 @@ class ServeTest(ServedFolder):
         viewer.send(type="show", index=9)
         self.assertEqual(viewer.end(), 4400)
 
+    def test_links_to_files_of_the_folder_are_no_frames(self):
+        server = self.serve(self.live)
+        viewer = self.view(server)
+        viewer.hello(server.token)
+        levels = viewer.levels()
+        (self.folder / "way").symlink_to(self.live)
+        self.appear("small0", "a.vdi")
+        for name, target in (("absolute", self.live / "a.vdi"), ("here", "./a.vdi"), ("bare", "a.vdi"),
+                             ("around", self.folder / "way" / "a.vdi"), ("link", self.live / "bare.vdi")):
+            (self.live / f"{name}.vdi").symlink_to(target)
+        shutil.copy(self.made / "large.vdi", self.folder / "elsewhere.vdi")
+        (self.live / "z.vdi").symlink_to(self.folder / "elsewhere.vdi")
+        while next(levels)[1] != self.bytes_of("large"):
+            pass
+        other = self.view(server)
+        other.hello(server.token)
+        self.assertEqual(other.text_message("welcome")["series"]["steps"], [3, 0])
+        self.assertEqual(server.end(), 0)
+
+    def test_replaced_files_are_new_frames(self):
+        self.appear("small0", "a.vdi")
+        server = self.serve(self.live)
+        viewer = self.view(server)
+        viewer.hello(server.token)
+        levels = viewer.levels()
+        self.assertEqual(next(levels)[1], self.bytes_of("small0"))
+        # Another viewer has the server keep the frame.
+        other = self.view(server)
+        other.hello(server.token)
+        other.send(type="show", index=0)
+        self.assertEqual(next(other.levels())[1], self.bytes_of("small0"))
+        # A file that was only touched, or written again as it was, is no new frame.
+        os.utime(self.live / "a.vdi")
+        self.appear("small0", "a.vdi")
+        self.appear("small1", "a.vdi")
+        announced, data = next(levels)
+        self.assertEqual((announced["frame"], announced["step"], data), (1, 4, self.bytes_of("small1")))
+        for asking in (viewer, other):
+            asking.send(type="show", index=0)
+            missing = asking.text_message("missing")
+            self.assertEqual((missing["frame"], missing["cause"]), (0, "the file was replaced"))
+        os.utime(self.live / "a.vdi")
+        other.send(type="show", index=1)
+        self.assertEqual(next(other.levels())[1], self.bytes_of("small1"))
+        self.assertEqual(server.end(), 0)
+
     def test_tokens(self):
         server = self.serve(self.made / "small0.vdi")
         self.assertEqual(len(server.token), 64)
