@@ -51,13 +51,14 @@ function refuse(what) {
  * @property {number} supersegments
  * @property {[number, number] | null} range of the colour map; null without one
  * @property {string[]} presets
+ * @property {number} [sampling_rate] samples per voxel, 0: automatic; older servers don't say
  * @typedef {{type: "steering", you: number, driver: number | null, period: number, paused: boolean,
  *            parameters: Parameter[], generator: Generator | null}} Steering what a driver may change,
  *     its present state, and the driver
  * @typedef {{type: "denied", cause: string}} Denied
  * @typedef {{type: "missing", frame: number, cause: string}} Missing the file of a wanted frame is
  *     damaged or gone
- * @typedef {{camera?: object, resolution?: [number, number], supersegments?: number,
+ * @typedef {{camera?: object, resolution?: [number, number], supersegments?: number, sampling_rate?: number,
  *            range?: [number, number], preset?: string, period?: number, paused?: boolean,
  *            parameters?: {[name: string]: number}}} Wish a driver's request
  * @typedef {{type: "other"}} Other a message that viewers don't need
@@ -71,6 +72,7 @@ const MOST_LEVEL_BYTES = 1 << 30;
 const MOST_LEVELS = 16;
 const MOST_LISTS = 32768;        // along a side
 const MOST_SUPERSEGMENTS = 1024; // in a list, maxSupersegments of vdi/core/Budget.h
+const MOST_SAMPLES = 64;         // in a voxel, and of voxels to a sample
 const MOST_ENTRIES = 64;         // parameters or presets
 const PART_HEADER_BYTES = 16;
 const FIRST_ROOM = 1 << 20;
@@ -160,14 +162,21 @@ function parameterOf(json) {
   return {name: textOf(json.name, MOST_ENTRIES), whole: whole === true, value, low, high};
 }
 
+/** @param {any} rate @returns {{sampling_rate?: number}} */
+function samplingRateOf(rate) {
+  if (rate === undefined || rate === null) return {};
+  if (rate !== 0 && !(typeof rate === "number" && rate >= 1 / MOST_SAMPLES && rate <= MOST_SAMPLES)) refuse("a wrong sampling rate");
+  return {sampling_rate: rate};
+}
+
 /** @param {any} json @returns {Generator} */
-function generatorOf({resolution, supersegments, range, presets}) {
+function generatorOf({resolution, supersegments, range, presets, sampling_rate}) {
   const isSize = Array.isArray(resolution) && resolution.length === 2 && resolution.every((side) => isWhole(side, 0, MOST_LISTS));
   if (!isSize || !isWhole(supersegments, 0, MOST_SUPERSEGMENTS)) refuse("a wrong resolution");
   const rises = Array.isArray(range) && range.length === 2 && range.every(Number.isFinite) && range[0] < range[1];
   if (!rises && range !== null) refuse("a range whose ends don't ascend");
   return {resolution: [resolution[0], resolution[1]], supersegments, range: rises ? [range[0], range[1]] : null,
-          presets: fewOf(presets, "presets").map((name) => textOf(name, MOST_ENTRIES))};
+          presets: fewOf(presets, "presets").map((name) => textOf(name, MOST_ENTRIES)), ...samplingRateOf(sampling_rate)};
 }
 
 /** @param {any} json @returns {Steering} */

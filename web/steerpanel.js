@@ -17,6 +17,7 @@ import {cameraText} from "./camera.js";
 
 const ENDS = ["low", "high"];  // fields of the colours' range
 const AUTO_DEGREES = 15;   // beyond this angle Auto requests a new viewpoint
+const RATES = ["automatic", "1", "2", "4", "8"];
 const RESOLUTIONS = ["480 × 270", "640 × 360", "960 × 540", "1280 × 720", "1920 × 1080"];
 
 /** @param {string} id */
@@ -107,6 +108,10 @@ export class SteerPanel {
       const [width, height] = fieldOf("resolution").value.split(" × ").map(Number);
       if (width > 0 && height > 0) this.ask({resolution: [width, height]});
     });
+    fieldOf("rate").addEventListener("change", () => {
+      const rate = fieldOf("rate").value;
+      this.ask({sampling_rate: rate === RATES[0] ? 0 : Number(rate)});
+    });
     fieldOf("preset").addEventListener("change", () => {
       if (fieldOf("preset").value !== "") this.ask({preset: fieldOf("preset").value});
     });
@@ -188,17 +193,20 @@ export class SteerPanel {
       : driver === null ? "Nobody is driving" : `Viewer ${driver} is driving`;
     partOf("drive").textContent = isMine ? "Give back" : "Drive";
     /** @type {HTMLButtonElement} */ (partOf("drive")).disabled = driver !== null && !isMine;
-    for (const id of ["halt", "auto", "resolution", "supersegments", "preset", "low", "high", "period"])
+    for (const id of ["halt", "auto", "resolution", "supersegments", "rate", "preset", "low", "high", "period"])
       fieldOf(id).disabled = !isMine;
     partOf("halt").textContent = paused ? "Resume simulation" : "Pause simulation";
     this.put("period", String(period));
     for (const one of document.querySelectorAll(".generator")) /** @type {HTMLElement} */ (one).hidden = generator === null;
     for (const one of document.querySelectorAll(".colours"))
       /** @type {HTMLElement} */ (one).hidden = !generator?.range;
+    for (const one of document.querySelectorAll(".rates"))
+      /** @type {HTMLElement} */ (one).hidden = generator?.sampling_rate === undefined;
     if (generator) {
       const [width, height] = generator.resolution;
       this.put("supersegments", String(generator.supersegments));
       this.choose("resolution", RESOLUTIONS, width > 0 ? `${width} × ${height}` : "");
+      this.choose("rate", RATES, generator.sampling_rate ? String(generator.sampling_rate) : RATES[0]);
       this.choose("preset", generator.presets, "");
       this.showRange(generator.range ?? [0, 1]);
     }

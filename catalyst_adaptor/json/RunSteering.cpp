@@ -35,6 +35,7 @@ stream::Controls RunSteering::controlsOf(const Steered& steered) const {
   stream::GeneratorControls generator;
   generator.resolution = {run.settings.width, run.settings.height};
   generator.supersegments = static_cast<int>(run.settings.supersegments);
+  generator.samplingRate = run.settings.samplesPerVoxel;
   const std::optional<ScalarRange> range = run.colors.range ? run.colors.range : steered.range;
   if (range) {
     generator.range = {range->min, range->max};
@@ -57,6 +58,7 @@ void RunSteering::apply(const stream::Wish& wish, const Steered& steered) {
     run.settings.height = (*wish.resolution)[1];
   }
   if (wish.supersegments) run.settings.supersegments = static_cast<std::uint32_t>(*wish.supersegments);
+  if (wish.samplingRate) run.settings.samplesPerVoxel = *wish.samplingRate;
   if (wish.preset) {  // keeps the range, and opacities that the run names
     if (!run.colors.range) run.colors.range = steered.range;
     run.colors.preset = *wish.preset;
@@ -112,7 +114,7 @@ bool RunSteering::take(const Steered& steered, std::int64_t step, double time) {
       wish = stream::wishOf(text);
       apply(wish, steered);
     });
-    const bool changesVdi = wish.camera || wish.resolution || wish.supersegments || wish.range || wish.preset;
+    const bool changesVdi = stream::changesVdi(wish);
     comm_.together([&] {
       if (stream_ == nullptr) return;
       stream_->setControls(controlsOf(steered));

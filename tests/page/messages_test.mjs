@@ -64,6 +64,8 @@ function testTexts() {
   check(serverMessageOf(JSON.stringify({...steering, driver: 7, generator: null})).driver === 7, "somebody drives");
   const many = serverMessageOf(JSON.stringify({...steering, generator: {...steering.generator, supersegments: 1024}}));
   check(many.type === "steering" && many.generator?.supersegments === 1024, "as many supersegments as a run may have");
+  const sampled = {...steering, generator: {...steering.generator, sampling_rate: 0.5}};
+  check(JSON.stringify(serverMessageOf(JSON.stringify(sampled))) === JSON.stringify(sampled), "a sampling rate");
   check(serverMessageOf('{"type":"denied","cause":"viewer 2\\ndrives"}').cause === "viewer 2 drives", "a denial of one line");
   const missing = serverMessageOf('{"type":"missing","frame":3,"cause":"damaged\\nor gone"}');
   check(JSON.stringify(missing) === '{"type":"missing","frame":3,"cause":"damaged or gone"}', "a frame that is missing");
@@ -75,6 +77,8 @@ function testTexts() {
     {...steering, parameters: Array(65).fill(steering.parameters[0])}, {...steering, generator: {...generator, range: [1, 1]}},
     {...steering, generator: {...generator, resolution: [1e9, 1]}}, {...steering, generator: {...generator, presets: [5]}},
     {...steering, generator: {...generator, supersegments: 1025}},
+    {...steering, generator: {...generator, sampling_rate: "2"}}, {...steering, generator: {...generator, sampling_rate: 65}},
+    {...steering, generator: {...generator, sampling_rate: 0.01}}, {...steering, generator: {...generator, sampling_rate: -0.5}},
     "", "{", "[]", "null", "1", '"x"', "{}", '{"type":3}', "x".repeat((1 << 20) + 1),
     {...level, frame: -1}, {...level, frame: 2 ** 32}, {...level, frame: "7"}, {...level, level: 2}, {...level, levels: 1e9},
     {...level, bytes: 0}, {...level, bytes: 2 ** 40}, {...level, bytes: 1.5}, {...level, bytes: null}, {...level, width: 0},
@@ -88,7 +92,7 @@ function testTexts() {
     const text = typeof message === "string" ? message : JSON.stringify(message);
     check(outcome(() => serverMessageOf(text)) === "refused", `${text.slice(0, 100)} is taken`);
   }
-  const sound = [level, welcome, steering, {type: "state", state: "live", viewers: 1, cause: "why"},
+  const sound = [level, welcome, steering, sampled, {type: "state", state: "live", viewers: 1, cause: "why"},
                  {type: "error", cause: "why"}, {type: "missing", frame: 3, cause: "why"}].map((m) => JSON.stringify(m));
   const end = performance.now() + 1000 * Number(process.env.VDI_FUZZ_SECONDS ?? 0);
   for (let round = 0; round < 20000 || performance.now() < end; ++round) {

@@ -340,6 +340,18 @@ function testNumbersOfThePanel() {
   check(panel.rows[0].field.value === "0.1234567891", `a number in full: ${panel.rows[0].field.value}`);
 }
 
+function testSamplingRate() {
+  const {byId, enter, leave, say, asked} = steered();
+  say({range: [0, 1], sampling_rate: 0});
+  check(byId("rate").value === "automatic", `the rate in force: ${byId("rate").value}`);
+  enter(byId("rate"), "4");
+  enter(byId("rate"), "automatic");
+  check(asked() === '[{"sampling_rate":4},{"sampling_rate":0}]', "sampling rates that are asked for");
+  leave();
+  say({range: [0, 1], sampling_rate: 0.5});
+  check(byId("rate").value === "0.5", `a rate that the page doesn't offer: ${byId("rate").value}`);
+}
+
 function testRangeUpwards() {
   const {byId, enter, leave, panel, say, asked} = steered();
   say({range: [0, 1]});
@@ -473,6 +485,7 @@ testFarFromTheOrigin();
 testNumbers();
 testNumbersOfThePanel();
 testRangeUpwards();
+testSamplingRate();
 await testFollowing();
 await testWrongFile();
 console.log(failures === 0 ? "all well" : `${failures} failures`);

@@ -101,7 +101,7 @@ std::string changed(std::string bytes, Noise& noise) {
 
 Controls controls() {
   Controls result;
-  result.generator = GeneratorControls{{640, 360}, 25, std::array{0.0, 0.5}, {"X Ray", "Cool to Warm"}};
+  result.generator = GeneratorControls{{640, 360}, 25, std::array{0.0, 0.5}, {"X Ray", "Cool to Warm"}, 0.0};
   result.parameters = {{"feed", false, 0.03, 0.0, 0.1}, {"steps", true, 3.0, 1.0, 9.0}};
   return result;
 }
@@ -117,6 +117,7 @@ Wish wishOf(Noise& noise) {
   }
   if (chance()) wish.resolution = {static_cast<int>(1 + noise.below(2000)), 360};
   if (chance()) wish.supersegments = 1 + static_cast<int>(noise.below(30));
+  if (chance()) wish.samplingRate = 80.0 * noise.unit();
   if (chance()) wish.range = {noise.unit() - 1.0, noise.unit() + 1e-3};
   if (chance()) wish.preset = chance() ? "none" : "X Ray";
   if (chance()) wish.period = 1 + static_cast<int>(noise.below(20));

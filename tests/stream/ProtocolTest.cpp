@@ -24,6 +24,7 @@ Wish everyWish() {
   wish.camera->viewAngle = 12.5;
   wish.resolution = {1920, 1080};
   wish.supersegments = 1024;
+  wish.samplingRate = 0.5;
   wish.range = {-0.5, 0.25};
   wish.preset = "X Ray";
   wish.period = 1000000;
@@ -48,7 +49,7 @@ const std::vector<FromViewer>& viewerMessages() {
 
 Controls everyControl() {
   Controls controls;
-  controls.generator = GeneratorControls{{0, 360}, 1024, std::array{-1.0, 1e300}, {"Viridis", "X Ray"}};
+  controls.generator = GeneratorControls{{0, 360}, 1024, std::array{-1.0, 1e300}, {"Viridis", "X Ray"}, 64.0};
   controls.period = 7;
   controls.paused = true;
   controls.parameters = {{"feed", false, 0.037, 0.0, 0.1}, {"seeds_0.x-y", true, 3.0, -1.0, 1e15}};
@@ -147,6 +148,10 @@ TEST_CASE("messages that make no sense are refused") {
       R"({"type":"steer","supersegments":0})",
       R"({"type":"steer","supersegments":1025})",
       R"({"type":"steer","supersegments":18446744073709551615})",
+      R"({"type":"steer","sampling_rate":"2"})",
+      R"({"type":"steer","sampling_rate":64.5})",
+      R"({"type":"steer","sampling_rate":0.01})",
+      R"({"type":"steer","sampling_rate":-1})",
       R"({"type":"steer","range":[1,1]})",
       R"({"type":"steer","range":[-1e308,1e308]})",
       R"({"type":"steer","preset":7})",

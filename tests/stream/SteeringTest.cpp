@@ -16,7 +16,7 @@ constexpr char token[] = "a-token-of-this-test-0123456789";
 
 Controls controls() {
   Controls result;
-  result.generator = GeneratorControls{{640, 360}, 25, std::array{0.0, 0.5}, {"Viridis", "X Ray"}};
+  result.generator = GeneratorControls{{640, 360}, 25, std::array{0.0, 0.5}, {"Viridis", "X Ray"}, 0.0};
   result.parameters = {{"feed", false, 0.037, 0.0, 0.1}, {"seeds", true, 3.0, 1.0, 9.0}};
   return result;
 }
@@ -164,6 +164,11 @@ TEST_CASE("wishes are held against what there is") {
   Wish view;
   view.supersegments = 9;
   CHECK(objectionTo(view, Controls{}) == "the VDIs aren't made where they are served");
+  Wish sampled;
+  sampled.samplingRate = 2.0;
+  CHECK(changesVdi(sampled));
+  CHECK(objectionTo(sampled, all) == "");
+  CHECK(objectionTo(sampled, Controls{}) == "the VDIs aren't made where they are served");
   Controls uncoloured = all;
   uncoloured.generator->range.reset();
   Wish range;
@@ -192,4 +197,12 @@ TEST_CASE("what wasn't taken is merged, and the later wish wins") {
       logEntryOf(*request, 12, 0.5) ==
       R"({"step":12,"time":0.5,"viewer":2,"steer":{"parameters":{"feed":0.02,"kill":0.5},"paused":false,"period":5}})");
   CHECK(summaryOf(request->wish) == "feed = 0.02, kill = 0.5, a VDI every 5 steps, go on");
+  Wish sampled;
+  sampled.samplingRate = 0.5;
+  CHECK(wishOf(textOf(sampled)) == sampled);
+  CHECK(summaryOf(sampled) == "sampling rate 0.5");
+  Wish automatic;
+  automatic.samplingRate = 0.0;
+  merge(sampled, automatic);
+  CHECK(summaryOf(sampled) == "automatic sampling rate");
 }

@@ -38,7 +38,7 @@ file = open(os.path.join(OUTPUT, "view_%d.txt" % rank), "w")
 def catalyst_execute(info):
     """Before the extractors of the step."""
     line = {"step": info.timestep, "position": list(image.CameraPosition), "angle": image.CameraViewAngle,
-            "resolution": list(image.Resolution), "supersegments": image.Supersegments,
+            "resolution": list(image.Resolution), "supersegments": image.Supersegments, "rate": image.SamplingRate,
             "colours": [colors.RGBPoints[0], colors.RGBPoints[-4]], "opacities": [opacities.Points[0], opacities.Points[-4]],
             "first": list(colors.RGBPoints[1:4])}
     print(json.dumps(line), file=file, flush=True)

@@ -92,9 +92,10 @@ def drive(port, token, folder):
     # All of it in one message arrives at one step.
     camera = {"position": [60.0, 20.0, 30.0], "focalPoint": [18.0, 6.0, 6.0], "viewUp": [0.0, 1.0, 0.0], "viewAngle": 25.0}
     driver.send(type="steer", camera=camera, parameters={"level": 0.8125, "waves": 5}, resolution=[120, 60], supersegments=7,
-                preset=PRESETS[0], range=[0.25, 0.75])
+                sampling_rate=2, preset=PRESETS[0], range=[0.25, 0.75])
     now = steering(driver, lambda message: values(message)["waves"] == 5)
     check(now["generator"]["resolution"] == [120, 60] and now["generator"]["supersegments"] == 7, now)
+    check((start["generator"]["sampling_rate"], now["generator"]["sampling_rate"]) == (0, 2), now)
     check(now["generator"]["range"] == [0.25, 0.75] and values(now)["level"] == 0.8125, now)
     check(steering(other, lambda message: values(message)["waves"] == 5)["driver"] == me["you"], "others see what is in force")
     level(driver, lambda announced: announced["width"] == 120)
@@ -153,7 +154,8 @@ def told(folder, driver, paused_at, camera):
     check(all(one == parameters[0] for one in parameters), "all ranks have the same parameters at the same steps")
     log = [json.loads(line) for line in lines(folder / "vdi-steering.jsonl")]
     changes = [(entry["viewer"], *entry["steer"]) for entry in log if "steer" in entry]
-    check(changes[0] == (driver, "camera", "parameters", "preset", "range", "resolution", "supersegments"), changes)
+    check(changes[0] == (driver, "camera", "parameters", "preset", "range", "resolution", "sampling_rate", "supersegments"),
+          changes)
     check(all(entry["time"] == 0.5 * entry["step"] for entry in log), "the log has steps and times")
     given = {int(step): (float(value), int(waves)) for step, value, waves in (line.split() for line in parameters[0])}
     at = log[0]["step"]
@@ -176,6 +178,7 @@ def told(folder, driver, paused_at, camera):
           "the view changes after the step that the log names")
     after = seen[at + 1]
     check(after["position"] == camera["position"] and after["angle"] == 25.0 and after["supersegments"] == 7, after)
+    check((seen[at]["rate"], after["rate"]) == (0, 2), "the sampling rate changes, too")
     check(after["resolution"] == [120, 60] and after["colours"] == after["opacities"] == [0.25, 0.75], after)
     check(after["first"] == [1.0, 1.0, 1.0], "X Ray begins with white: %s" % after["first"])
 

@@ -8,6 +8,8 @@
 #include <iterator>
 #include <utility>
 
+#include "vdi/core/GenerateSettings.h"
+
 namespace vdi::stream {
 
 namespace {
@@ -35,10 +37,13 @@ bool isParameterName(std::string_view name) {
          name.find_first_not_of(letters) == std::string_view::npos;
 }
 
+bool changesVdi(const Wish& wish) {
+  return wish.camera || wish.resolution || wish.supersegments || wish.samplingRate || wish.range ||
+         wish.preset;
+}
+
 std::string objectionTo(const Wish& wish, const Controls& controls) {
-  const bool concernsGenerator =
-      wish.camera || wish.resolution || wish.supersegments || wish.range || wish.preset;
-  if (concernsGenerator && !controls.generator) return "the VDIs aren't made where they are served";
+  if (changesVdi(wish) && !controls.generator) return "the VDIs aren't made where they are served";
   if (wish.range && !controls.generator->range) return "the VDIs have no colour map";
   if (wish.preset) {
     const std::vector<std::string>& presets = controls.generator->presets;
@@ -56,6 +61,7 @@ void merge(Wish& wish, const Wish& later) {
   replace(wish.camera, later.camera);
   replace(wish.resolution, later.resolution);
   replace(wish.supersegments, later.supersegments);
+  replace(wish.samplingRate, later.samplingRate);
   replace(wish.range, later.range);
   replace(wish.preset, later.preset);
   replace(wish.period, later.period);
@@ -73,6 +79,11 @@ std::string summaryOf(const Wish& wish) {
   if (wish.resolution)
     parts.push_back(fmt::format("resolution {}x{}", (*wish.resolution)[0], (*wish.resolution)[1]));
   if (wish.supersegments) parts.push_back(fmt::format("supersegments {}", *wish.supersegments));
+  if (wish.samplingRate) {
+    parts.push_back(*wish.samplingRate == automaticRate
+                        ? "automatic sampling rate"
+                        : fmt::format("sampling rate {}", *wish.samplingRate));
+  }
   if (wish.preset) parts.push_back(fmt::format("colours \"{}\"", *wish.preset));
   if (wish.range)
     parts.push_back(fmt::format("colours from {:.6g} to {:.6g}", (*wish.range)[0], (*wish.range)[1]));

@@ -41,6 +41,7 @@ struct GeneratorControls {
   int supersegments = 0;                       // N_S
   std::optional<std::array<double, 2>> range;  // of the colour map, if there is one
   std::vector<std::string> presets;            // names of colour maps to choose from
+  std::optional<double> samplingRate;          // samples per voxel, 0: automatic; older servers don't say
   bool operator==(const GeneratorControls&) const = default;
 };
 
@@ -58,6 +59,7 @@ struct Wish {
   std::optional<Camera> camera;                  // a viewpoint V_O that View accepts
   std::optional<std::array<int, 2>> resolution;  // 1 to View::maxSide
   std::optional<int> supersegments;              // 1 to vdi::maxSupersegments
+  std::optional<double> samplingRate;            // what the table of settings allows
   std::optional<std::array<double, 2>> range;    // finite, rising
   std::optional<std::string> preset;             // one of GeneratorControls::presets
   std::optional<int> period;                     // 1 to maxPeriod
@@ -68,6 +70,8 @@ struct Wish {
   bool operator==(const Wish&) const = default;
 };
 
+/// Whether the VDIs of the same step would differ.
+bool changesVdi(const Wish& wish);
 /// The reason why the wish can't be granted under these controls; empty if it can.
 std::string objectionTo(const Wish& wish, const Controls& controls);
 /// Adds a later wish, which wins.

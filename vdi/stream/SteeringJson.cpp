@@ -7,6 +7,7 @@
 
 #include "vdi/core/Budget.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/SettingsTable.h"
 
 namespace vdi::stream {
 
@@ -124,6 +125,16 @@ Parameter parameterIn(const Json& value) {
   return parameter;
 }
 
+double samplingRateIn(const Json& value) {
+  const double rate = numberIn(value, "sampling_rate");
+  try {
+    settingsTable()[indexOfSetting("SamplingRate")].check(rate);
+  } catch (const Error& error) {
+    refuse(fmt::format("\"sampling_rate\": {}", error.what()));
+  }
+  return rate;
+}
+
 GeneratorControls generatorIn(const Json& value) {
   if (!value.is_object()) refuse("\"generator\" isn't an object");
   GeneratorControls controls;
@@ -132,6 +143,7 @@ GeneratorControls generatorIn(const Json& value) {
   if (!at(value, "range").is_null()) controls.range = rangeIn(value["range"]);
   for (const Json& preset : arrayIn(at(value, "presets"), "presets", 0, maxPresets))
     controls.presets.push_back(textIn(preset, "presets"));
+  if (!at(value, "sampling_rate").is_null()) controls.samplingRate = samplingRateIn(value["sampling_rate"]);
   return controls;
 }
 
@@ -146,6 +158,7 @@ Json jsonOf(const Wish& wish) {
   if (wish.camera) object["camera"] = jsonOf(*wish.camera);
   if (wish.resolution) object["resolution"] = *wish.resolution;
   if (wish.supersegments) object["supersegments"] = *wish.supersegments;
+  if (wish.samplingRate) object["sampling_rate"] = *wish.samplingRate;
   if (wish.range) object["range"] = *wish.range;
   if (wish.preset) object["preset"] = *wish.preset;
   if (wish.period) object["period"] = *wish.period;
@@ -160,6 +173,7 @@ Wish wishIn(const Json& object) {
   if (!at(object, "resolution").is_null()) wish.resolution = resolutionIn(object["resolution"], 1);
   if (!at(object, "supersegments").is_null())
     wish.supersegments = wholeIn(object["supersegments"], "supersegments", 1, maxSupersegments);
+  if (!at(object, "sampling_rate").is_null()) wish.samplingRate = samplingRateIn(object["sampling_rate"]);
   if (!at(object, "range").is_null()) wish.range = rangeIn(object["range"]);
   if (!at(object, "preset").is_null()) wish.preset = textIn(object["preset"], "preset");
   if (!at(object, "period").is_null()) wish.period = wholeIn(object["period"], "period", 1, maxPeriod);
@@ -189,6 +203,7 @@ Json jsonOf(const Controls& controls) {
                            {"supersegments", generator.supersegments},
                            {"range", generator.range ? Json(*generator.range) : Json()},
                            {"presets", generator.presets}};
+    if (generator.samplingRate) object["generator"]["sampling_rate"] = *generator.samplingRate;
   }
   return object;
 }

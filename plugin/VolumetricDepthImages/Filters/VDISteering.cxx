@@ -109,10 +109,6 @@ void SetColours(vtkSMProxy* generator, const Wish& wish) {
   }
 }
 
-bool ChangesVDI(const Wish& wish) {
-  return wish.camera || wish.resolution || wish.supersegments || wish.range || wish.preset;
-}
-
 ParameterExchange ExchangeParameters(std::map<std::string, double> changes) {
   ParameterExchange exchange{std::move(changes), {}};
   if (auto* const controller = vtkMultiProcessController::GetGlobalController())
@@ -125,6 +121,7 @@ vdi::stream::GeneratorControls ControlsOf(vtkSMProxy* generator) {
   const vtkSMPropertyHelper resolution(generator, "Resolution");
   controls.resolution = {resolution.GetAsInt(0), resolution.GetAsInt(1)};
   controls.supersegments = vtkSMPropertyHelper(generator, "Supersegments").GetAsInt();
+  controls.samplingRate = vtkSMPropertyHelper(generator, "SamplingRate").GetAsDouble();
   std::array<double, 2> range{};
   vtkSMProxy* const colours = FunctionOf(generator, "LookupTable");
   if (colours != nullptr && vtkSMTransferFunctionProxy::GetRange(colours, range.data()) &&
@@ -195,7 +192,7 @@ void Steering::Meet(vtkSMSourceProxy* writer, vtkSMExtractsController* extractor
               vdi::stream::logEntryOf(*request, extractor->GetTimeStep(), extractor->GetTime()));
       if (trouble.empty()) trouble = failure;
     }
-    if (!ChangesVDI(wish)) continue;
+    if (!vdi::stream::changesVdi(wish)) continue;
     this->SinceLast = this->Period;  // a viewer who asks for a change needn't wait for a long period
     if (this->IsPaused) writer->UpdatePipeline(extractor->GetTime());
   } while (this->IsPaused);
@@ -203,10 +200,11 @@ void Steering::Meet(vtkSMSourceProxy* writer, vtkSMExtractsController* extractor
 }
 
 void Steering::Apply(const Wish& wish, vtkSMProxy* generator) {
-  if (generator != nullptr && ChangesVDI(wish)) {
+  if (generator != nullptr && vdi::stream::changesVdi(wish)) {
     if (wish.camera) SetCamera(generator, *wish.camera);
     if (wish.resolution) vtkSMPropertyHelper(generator, "Resolution").Set(wish.resolution->data(), 2);
     if (wish.supersegments) vtkSMPropertyHelper(generator, "Supersegments").Set(*wish.supersegments);
+    if (wish.samplingRate) vtkSMPropertyHelper(generator, "SamplingRate").Set(*wish.samplingRate);
     SetColours(generator, wish);
     generator->UpdateVTKObjects();
   }
