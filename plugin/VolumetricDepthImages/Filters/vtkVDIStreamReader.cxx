@@ -132,6 +132,7 @@ class vtkVDIStreamReader::Link {
     std::string line = this->Authority + ": ";
     if (standing.isConnected) {
       line += nameOf(standing.state.phase);
+      if (standing.hasState && !standing.state.cause.empty()) line += "; " + standing.state.cause;
     } else if (standing.trouble.empty()) {
       line += "connecting";
     } else {
