@@ -118,6 +118,7 @@ rows = json.load(open("stream.json"))["rows"]
 assert [row["way"] for row in rows] == ["live", "folder"], rows
 for row in rows:
     assert row["frames_seen"] >= 2 and row["frames_per_second"] > 0 and row["age_ms"] > 0, row
+    assert 0 < row["object_ssim_first"] <= row["object_ssim_full"] + 1e-3 <= row["ssim_full"] + 0.01, row
     assert row["encode_ms"] > 0 and row["step_ms"] > 0 and row["crowd_step_ratio"] > 0, row
 P
 refused 2 "rates" "$vdi" bench --suite stream --fields sphere "${small[@]}" --rates fast -o x.json
