@@ -117,7 +117,7 @@ Wish wishOf(Noise& noise) {
   }
   if (chance()) wish.resolution = {static_cast<int>(1 + noise.below(2000)), 360};
   if (chance()) wish.supersegments = 1 + static_cast<int>(noise.below(30));
-  if (chance()) wish.samplingRate = 80.0 * noise.unit();
+  if (chance()) wish.samplingRate = chance() ? 0.0 : 0.5 + 32.0 * noise.unit();
   if (chance()) wish.range = {noise.unit() - 1.0, noise.unit() + 1e-3};
   if (chance()) wish.preset = chance() ? "none" : "X Ray";
   if (chance()) wish.period = 1 + static_cast<int>(noise.below(20));
