@@ -59,9 +59,15 @@ SearchResult searchList(bool write, float known, uint budget) {
   float sensitivity = write ? known : smallestSensitivity;
   // Try 0 is the first one, try 1 the one that always fits, and the others bisect. A single loop has only one
   // copy of feedIntervals.
-  for (int i = 0; i < maxTries + 2; ++i) {
+  // It ends by its number of tries when writing, too: with a return here, compact lists never end on lavapipe
+  // of Mesa 26.1.
+  int tries = write ? 1 : maxTries + 2;
+  for (int i = 0; i < tries; ++i) {
     uint count = searchTry(sensitivity);
-    if (write) return SearchResult(sensitivity, count);
+    if (write) {
+      best = SearchResult(sensitivity, count);
+      break;
+    }
     if (i == 0) {
       maxCount = cutAtGaps ? max(budget, search.runs) : budget;
       if (search.visible <= maxCount) return SearchResult(-1.0, search.visible);
