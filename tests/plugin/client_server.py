@@ -142,6 +142,15 @@ with Session() as session:
         check(pvtest.message_in(view) == "" and pvtest.ssim(picture, alone) > 0.99,
               order + ": without the volume, the VDI is seen again")
 
+    # The server can't make a VDI of this blend mode.
+    image.BlendMode = "Maximum Intensity"
+    simple.Render(view)
+    check("what makes it has failed" in pvtest.message_in(view), "the view says that the server has failed")
+    image.BlendMode = "Composite"
+    simple.Render(view)
+    check(pvtest.message_in(view) == "" and pvtest.ssim(screenshot(view, "client_server_again.png"), alone) > 0.99,
+          "after the server has failed, its next VDI is shown")
+
 with open(LOG) as log:
     said = log.read()
 print(said)

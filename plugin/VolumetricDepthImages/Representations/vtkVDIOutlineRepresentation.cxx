@@ -8,6 +8,7 @@
 #include <vtkTrivialProducer.h>
 
 #include "VDIPlace.h"
+#include "VDIUpdate.h"
 
 vtkStandardNewMacro(vtkVDIOutlineRepresentation);
 
@@ -19,6 +20,12 @@ vtkVDIOutlineRepresentation::~vtkVDIOutlineRepresentation() = default;
 
 void vtkVDIOutlineRepresentation::PrintSelf(ostream& os, vtkIndent indent) {
   this->Superclass::PrintSelf(os, indent);
+}
+
+int vtkVDIOutlineRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, vtkInformation* in,
+                                                    vtkInformation* out) {
+  const pv::Update update(this, request);
+  return this->Superclass::ProcessViewRequest(request, in, out);
 }
 
 int vtkVDIOutlineRepresentation::RequestData(vtkInformation* request, vtkInformationVector** inputs,

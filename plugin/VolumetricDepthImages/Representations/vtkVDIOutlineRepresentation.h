@@ -21,6 +21,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIOutlineRepresentation
   static vtkVDIOutlineRepresentation* New();
   vtkTypeMacro(vtkVDIOutlineRepresentation, vtkOutlineRepresentation);
   void PrintSelf(ostream& os, vtkIndent indent) override;
+  int ProcessViewRequest(vtkInformationRequestKey* request, vtkInformation* in, vtkInformation* out) override;
 
   using vtkOutlineRepresentation::GetInternalOutputPort;
   /// The output with the box's corners, in place of the input's copy.

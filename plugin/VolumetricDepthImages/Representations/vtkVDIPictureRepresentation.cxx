@@ -25,6 +25,7 @@
 #include <algorithm>
 
 #include "VDIPlace.h"
+#include "VDIUpdate.h"
 #include "vdi/core/Error.h"
 
 vtkStandardNewMacro(vtkVDIPictureRepresentation);
@@ -127,7 +128,10 @@ void vtkVDIPictureRepresentation::Pack(vtkDataObject* input) {
 
 int vtkVDIPictureRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, vtkInformation* in,
                                                     vtkInformation* out) {
-  if (!this->Superclass::ProcessViewRequest(request, in, out)) return 0;
+  {
+    const pv::Update update(this, request);
+    if (!this->Superclass::ProcessViewRequest(request, in, out)) return 0;
+  }
   if (request == vtkPVView::REQUEST_UPDATE()) {
     vtkPVView::SetPiece(in, this, this->Piece);
     vtkPVRenderView::SetGeometryBounds(in, this, this->PieceBounds.data());

@@ -26,6 +26,7 @@
 
 #include "VDIPiece.h"
 #include "VDISession.h"
+#include "VDIUpdate.h"
 #include "vtkVDIForViews.h"
 #include "vtkVDIProp.h"
 
@@ -162,6 +163,7 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
   const bool updates = request == vtkPVView::REQUEST_UPDATE() && this->GetNeedsUpdate();
   this->HasPacked = false;
   {
+    const pv::Update update(this, request);
     const vtkVDIForViews::Bracket bracket(request == vtkPVView::REQUEST_UPDATE() ? this : nullptr);
     if (!this->Superclass::ProcessViewRequest(request, in, out)) return 0;
   }
