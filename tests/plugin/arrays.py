@@ -112,6 +112,17 @@ picture(image)
 check(image.LookupTable is None, "a script's choice of no map survives an update")
 simple.Delete(image)
 
+# The window's panel blanks the choice of a filter that a script has made before its input had data.
+image = simple.VolumetricDepthImage(Input=ball, SelectInputScalars=["POINTS", "temperature"], Resolution=SIZE)
+expected, table = picture(image), image.LookupTable
+for blank in (["POINTS", ""], ["CELLS", ""]):
+    image.SelectInputScalars = blank
+    check(list(image.SelectInputScalars) == ["POINTS", "temperature"] and image.LookupTable == table,
+          "a filter whose choice of an array is blanked keeps array and map: %s, %s"
+          % (list(image.SelectInputScalars), image.LookupTable))
+    check(np.abs(picture(image).astype(int) - expected).max() <= 1, "a filter whose choice is blanked shows the same")
+simple.Delete(image)
+
 # Vectors.
 image = simple.VolumetricDepthImage(Input=ball, SelectInputScalars=["POINTS", "velocity"])
 check(image.Component == -1, "by default vectors show their magnitude")

@@ -253,10 +253,20 @@ vtkSMVDIGeneratorProxy::Subject vtkSMVDIGeneratorProxy::CurrentSubject() {
 
 /// Lets map, component and unit distance follow the array and the input after the first update.
 void vtkSMVDIGeneratorProxy::FollowArray() {
-  const Subject now = this->CurrentSubject();
+  Subject now = this->CurrentSubject();
   if (!this->Shown) this->Shown = now;  // after a state file was loaded
   if (now == *this->Shown || now.Input == nullptr) return;
   const Set choosing(this->Choosing);
+  // The panel blanks the choice of a filter that a script has made before its input had data. The filter
+  // keeps its array.
+  if (now.Array.empty() && !this->Shown->Array.empty()) {
+    now.Array = this->Shown->Array;
+    now.Association = this->Shown->Association;
+    vtkSMPropertyHelper(this, "SelectInputScalars")
+        .SetInputArrayToProcess(now.Association, now.Array.c_str());
+    this->Superclass::UpdateVTKObjects();
+    if (now == *this->Shown) return;
+  }
   const Subject before = std::exchange(*this->Shown, now);
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "the array's map and settings");
   if (now.Input != before.Input || now.Port != before.Port) {
