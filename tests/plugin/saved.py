@@ -1,0 +1,58 @@
+"""What ParaView saves of a filter: the defaults of later filters."""
+
+import os
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import pvtest  # noqa: E402
+from paraview import simple  # noqa: E402
+from paraview.modules.vtkRemotingServerManager import vtkSMSettings  # noqa: E402
+from pvtest import check  # noqa: E402
+
+SIZE, POSITION = [120, 90], [40, 30, 50]
+
+
+def shown_wavelet(**properties):
+    """A wavelet that the active view shows as a volume."""
+    wavelet = simple.Wavelet(WholeExtent=[-8, 8, -8, 8, -8, 8])
+    view = pvtest.make_view(SIZE, POSITION, [1, 0, -1])
+    pvtest.paraview_volume(wavelet, view, "POINTS", "RTData", 2.5, **properties)
+    simple.SetActiveView(view)
+    return wavelet, view
+
+
+def save_as_default(proxy):
+    """As the panel's button Save current settings as default does."""
+    vtkSMSettings.GetInstance().SetProxySettings(proxy.SMProxy, None, True)
+
+
+def defaults():
+    """The first update of a filter takes what its view shows, whatever an earlier filter took."""
+    wavelet, view = shown_wavelet(Shade=1, Diffuse=0.6, UseCropping=1, CroppingScale=[0.5, 0.6, 0.7],
+                                  BlendMode="Isosurface", IsosurfaceValues=[150])
+    first = simple.VolumetricDepthImage(Input=wavelet, PictureOnly=1, Supersegments=12)
+    first.UpdatePipeline()
+    first.TimeStep = 7
+    check(first.Shade == 1 and first.Cropping == 1 and first.BlendMode == "Isosurface" and
+          list(first.Resolution) == SIZE and list(first.CameraPosition) == POSITION, "the filter takes what the view shows")
+    rendered = simple.RenderVDI(Input=first, Resolution=[64, 48], CameraPosition=POSITION, CameraFocalPoint=[1, 0, -1],
+                                CameraViewUp=[0, 0, 1], CameraViewAngle=20, CameraParallelProjection=1,
+                                CameraParallelScale=9)
+    save_as_default(first)
+    save_as_default(rendered)
+    fresh = simple.VolumetricDepthImage(Input=simple.Wavelet())
+    again = simple.RenderVDI(Input=fresh)
+    check(fresh.Supersegments == 12 and fresh.PictureOnly == 1 and list(again.Resolution) == [64, 48],
+          "later filters begin with the settings that were saved as default")
+    taken = ("ScalarOpacityUnitDistance", "Resolution", "Shade", "Ambient", "Diffuse", "Lights", "Cropping", "CroppingBox",
+             "BlendMode", "IsosurfaceValues", "TimeStep")
+    camera = ("CameraPosition", "CameraFocalPoint", "CameraViewUp", "CameraViewAngle", "CameraParallelProjection",
+              "CameraParallelScale")
+    kept = [name for name in taken + camera if not fresh.SMProxy.GetProperty(name).IsValueDefault()]
+    kept += [name for name in camera if not again.SMProxy.GetProperty(name).IsValueDefault()]
+    check(not kept, "later filters have no earlier filter's viewpoint, nor its display settings; kept: %s" % kept)
+    vtkSMSettings.GetInstance().ClearAllSettings()
+
+
+defaults()
+pvtest.finish()
