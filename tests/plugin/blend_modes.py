@@ -44,7 +44,7 @@ for association, names in (("POINTS", MODES), ("CELLS", ("Maximum Intensity", "I
         set_blend(shown, number, values)
         theirs = paraview_volume(source, view, association, "waves", UNIT, keep_range=True, Shade=shade)
         simple.SetActiveView(view)
-        image = vdi_filter(source, view, association, "waves", UNIT, PictureOnly=1)
+        image = vdi_filter(source, view, association, "waves", UNIT, PictureOnly=1, Resolution=[0, 0])
         ours = picture(image)
         what = "%s of %s" % (name, association.lower())
         check(image.BlendMode == name.split(",")[0], what + ": the first update takes the mode, " + str(image.BlendMode))

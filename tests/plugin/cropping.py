@@ -29,7 +29,7 @@ for name, shade in (("unshaded", 0), ("shaded", 1)):
     theirs = paraview_volume(source, view, "CELLS", "field", 2.0, Shade=shade, UseCropping=1, CroppingOrigin=SHIFT,
                              CroppingScale=SCALE)
     simple.SetActiveView(view)
-    image = vdi_filter(source, view, "CELLS", "field", 2.0)
+    image = vdi_filter(source, view, "CELLS", "field", 2.0, Resolution=[0, 0])
     ours = picture(image)
     box = drawn_box(view)
     check(image.Cropping == 1 and np.allclose(image.CroppingBox, box), name + ": the first update takes the volume's box")
@@ -44,7 +44,7 @@ for name, shade in (("unshaded", 0), ("shaded", 1)):
 representation = simple.GetRepresentation(source, view)
 representation.BlendMode = "Isosurface"
 own_box, own_lights = [0, 20, 10, 40, 25, 60], [0, 0, 1, 1, 0.5, 0.5]
-own = vdi_filter(source, view, "CELLS", "field", 2.0, Resolution=[16, 12], CroppingBox=own_box, Diffuse=0.5,
+own = vdi_filter(source, view, "CELLS", "field", 2.0, Resolution=[0, 0], CroppingBox=own_box, Diffuse=0.5,
                  IsosurfaceValues=[150], Lights=own_lights)
 own.UpdatePipeline()
 check(own.Cropping == 0 and list(own.CroppingBox) == own_box, "a box that was set before the first update stays")
@@ -76,7 +76,7 @@ simple.SetActiveView(view)
 for mode in ("Slice", "Composite"):
     representation.BlendMode = mode
     with Messages("WarningEvent") as said:
-        picture(vdi_filter(source, view, "CELLS", "field", 2.0))
+        picture(vdi_filter(source, view, "CELLS", "field", 2.0, Resolution=[0, 0]))
     about = [message for message in said if "Blend Mode" in message]
     check(len(about) == (0 if mode == "Composite" else 1), "%s: %d messages that it can't be had" % (mode, len(about)))
 for name, usual, value, words in (("UseSeparateOpacityArray", 0, 1, "Separate Opacity Array"),
@@ -84,7 +84,7 @@ for name, usual, value, words in (("UseSeparateOpacityArray", 0, 1, "Separate Op
                                   ("Scale", [1, 1, 1], [1, 1, 2], "Transforming")):
     setattr(representation, name, value)
     with Messages("WarningEvent") as said:
-        vdi_filter(source, view, "CELLS", "field", 2.0, Resolution=[16, 12]).UpdatePipeline()
+        vdi_filter(source, view, "CELLS", "field", 2.0, Resolution=[0, 0]).UpdatePipeline()
     check(len(said) == 1 and words in said[0], "%s: a message that it can't be had: %s" % (name, " | ".join(said)))
     setattr(representation, name, usual)
 finish()

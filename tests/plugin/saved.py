@@ -1,11 +1,13 @@
-"""What ParaView saves of a filter: the defaults of later filters."""
+"""What ParaView saves of a filter: the defaults of later filters, and scripts that make the same VDI anew."""
 
 import os
 import sys
 
+import numpy as np
+
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import pvtest  # noqa: E402
-from paraview import simple  # noqa: E402
+from paraview import simple, smstate  # noqa: E402
 from paraview.modules.vtkRemotingServerManager import vtkSMSettings  # noqa: E402
 from pvtest import check  # noqa: E402
 
@@ -54,5 +56,49 @@ def defaults():
     vtkSMSettings.GetInstance().ClearAllSettings()
 
 
+DISPLAY = dict(Shade=1, Diffuse=0.6, UseCropping=1, CroppingScale=[0.5, 0.6, 0.7])
+
+
+def python_state():
+    """A script leaves out values that are the default. The volume's own display settings mustn't take their place."""
+    wavelet, view = shown_wavelet()
+    image = simple.VolumetricDepthImage(registrationName="vdi", Input=wavelet)
+    simple.Show(image, view)
+    simple.Render(view)
+    volume = simple.GetRepresentation(wavelet, view)
+    for name, value in DISPLAY.items():
+        setattr(volume, name, value)
+    view.UseLight = 0  # other lights
+    simple.AddLight(view=view).Coords = "Headlight"
+    expected = pvtest.picture(image)
+    script = smstate.get_state()
+    check(expected.max() > 60 and "vdi.Resolution" in script and ".Shade = 1" in script and "vdi.Shade" not in script,
+          "the state has the VDI's size, and the volume's shading alone")
+    simple.ResetSession()
+    exec(script, {})
+    again = simple.FindSource("vdi")
+    seen = pvtest.picture(again)
+    check(again.Shade == 0 and again.Cropping == 0 and len(again.Lights) == 0,
+          "the script's VDI keeps its display settings: Shade %d, Cropping %d, %d numbers of lights"
+          % (again.Shade, again.Cropping, len(again.Lights)))
+    check(np.abs(seen.astype(int) - expected).max() <= 1, "the script makes the same VDI")
+    simple.ResetSession()
+
+
+def what_is_set():
+    """What the first update takes of the view's display settings if camera, size or both are set."""
+    wavelet, view = shown_wavelet(**DISPLAY)
+    camera = dict(CameraPosition=POSITION, CameraFocalPoint=[1, 0, -1])
+    for what, properties, takes in (("nothing", {}, 1), ("a camera", camera, 1), ("a size", dict(Resolution=[64, 48]), 1),
+                                    ("camera and size", dict(camera, Resolution=[64, 48]), 0)):
+        image = simple.VolumetricDepthImage(Input=wavelet, **properties)
+        image.UpdatePipeline()
+        check(image.Shade == takes and image.Cropping == takes and (image.ScalarOpacityUnitDistance == 2.5) == bool(takes),
+              "a filter of which %s is set takes %s of the volume's display settings" % (what, "all" if takes else "none"))
+        check(list(image.CameraPosition) == POSITION, "a filter of which %s is set has the view's camera" % what)
+
+
 defaults()
+python_state()
+what_is_set()
 pvtest.finish()

@@ -45,7 +45,7 @@ for name, (values, spacing, kind, as_cells, parallel_scale, properties) in CASES
     volume = picture(vdi_filter(source, view, association, "field", unit, PictureOnly=1, Shade=1, **properties))
     representation.Shade = 1
     simple.SetActiveView(view)
-    taking = vdi_filter(source, view, association, "field", unit)
+    taking = vdi_filter(source, view, association, "field", unit, Resolution=[0, 0])
     vdi = picture(taking)
     check(taking.Shade == 1 and taking.Diffuse == properties.get("Diffuse", 1.0) and len(taking.Lights) == 0,
           name + ": the first update takes the volume's shading")
@@ -73,7 +73,7 @@ for name in ("headlight", "two_lights", "no_light"):
         second.DiffuseColor = [0.1, 0.3, 0.6]
     theirs = paraview_volume(source, view, "POINTS", "field", 6.0, Shade=1, Ambient=0.2, Diffuse=0.6)
     simple.SetActiveView(view)
-    ours = picture(vdi_filter(source, view, "POINTS", "field", 6.0))
+    ours = picture(vdi_filter(source, view, "POINTS", "field", 6.0, Resolution=[0, 0]))
     off = np.abs(ours.astype(int) - theirs).mean()
     check(theirs.max() > 60 or name == "no_light", name + ": something is seen")
     check(off < 1.5 and ssim(ours, theirs) >= 0.99,

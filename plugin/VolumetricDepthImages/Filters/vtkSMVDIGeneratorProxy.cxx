@@ -365,16 +365,21 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
   vtkSMProxy* shown = this->RepresentationIn(this->ActiveView());
   vtkSMRenderViewProxy* view = this->ViewToTakeFrom();
   if (view == nullptr) return;
-  this->TakeUnitDistance();
-  pv::takeShading(this, shown, view);
-  pv::takeCropping(this, shown, this->InputInformation());
-  pv::takeBlending(this, shown);
-  if (const std::string issues = pv::displayIssues(shown); !issues.empty()) vtkWarningMacro(<< issues);
-  if (isPlaced(view) && vtkSMPropertyHelper(this, "CameraPosition").GetDoubleArray() ==
-                            vtkSMPropertyHelper(this, "CameraFocalPoint").GetDoubleArray())
-    SetCamera(this, view);
+  const bool hasCamera = vtkSMPropertyHelper(this, "CameraPosition").GetDoubleArray() !=
+                         vtkSMPropertyHelper(this, "CameraFocalPoint").GetDoubleArray();
   vtkSMPropertyHelper resolution(this, "Resolution");
-  if (resolution.GetAsInt(0) == 0 && resolution.GetAsInt(1) == 0) {
+  const bool hasSize = resolution.GetAsInt(0) != 0 || resolution.GetAsInt(1) != 0;
+  // A script that sets both describes the whole VDI. Saved Python states do so, and leave out the values that
+  // are the default.
+  if (!hasCamera || !hasSize || this->HasViewpointOfView) {
+    this->TakeUnitDistance();
+    pv::takeShading(this, shown, view);
+    pv::takeCropping(this, shown, this->InputInformation());
+    pv::takeBlending(this, shown);
+    if (const std::string issues = pv::displayIssues(shown); !issues.empty()) vtkWarningMacro(<< issues);
+  }
+  if (!hasCamera && isPlaced(view)) SetCamera(this, view);
+  if (!hasSize) {
     const std::array<int, 2> size = resolutionOf(view);
     resolution.Set(size.data(), 2);
   }
@@ -470,6 +475,7 @@ std::string vtkSMVDIGeneratorProxy::SetViewpoint(vtkSMViewProxy* view) {
   SetCamera(this, renderView);
   pv::takeLights(this, renderView);
   vtkSMPropertyHelper(this, "Resolution").Set(size.data(), 2);
+  this->HasViewpointOfView = true;
   this->UpdateVTKObjects();
   return {};
 }

@@ -6,8 +6,9 @@
  * shows the input, or whose camera a user has placed: the camera if position and focal point are the same,
  * Resolution if it is 0 0, ScalarOpacityUnitDistance if it is 0, Shade, Diffuse and Ambient if the view shows
  * a shaded volume, Cropping and CroppingBox if it shows a cropped one, BlendMode and IsosurfaceValues if it
- * shows a volume, and Lights. Of these groups it takes those of which each property has its default. Traces
- * and state files have the values. Proxies that a state file makes, or the undo of a deletion, take nothing.
+ * shows a volume, and Lights. Of these groups it takes those of which each property has its default. If both
+ * camera and Resolution are set, other than by SetViewpoint, it takes nothing. Traces and state files have
+ * the values. Proxies that a state file makes, or the undo of a deletion, take nothing.
  *
  * If LookupTable has never been set, the proxy takes ParaView's colour map for the chosen array: the one that
  * a representation of the input uses in the active view, or would use, with its opacity function. The proxy
@@ -148,6 +149,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
 
   bool UpdatesForView = false;
   bool Taken = false;                       // whether the proxy has taken the view's properties
+  bool HasViewpointOfView = false;          // set by SetViewpoint
   bool Choosing = false;                    // true within ChooseLookupTable and FollowArray
   std::string Chosen;                       // the array whose map this proxy has set
   vtkWeakPointer<vtkSMProxy> ChosenMap;     // that map
