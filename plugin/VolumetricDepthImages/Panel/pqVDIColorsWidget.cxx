@@ -138,7 +138,9 @@ void pqVDIColorsWidget::edit() {
     dialog->setAttribute(Qt::WA_DeleteOnClose);
     // A VDI uses transfer functions of one value.
     if (auto* planar = dialog->findChild<QCheckBox*>("Use2DTransferFunction")) planar->hide();
-    this->connect(dialog, &QDialog::rejected, this, &pqVDIColorsWidget::restore);
+    // The button alone takes edits back. The window's own ways to close a dialog keep them.
+    if (auto* cancel = dialog->findChild<QPushButton*>("CancelButton"))
+      this->connect(cancel, &QPushButton::clicked, this, &pqVDIColorsWidget::restore);
     this->keepMaps(map);
     this->Dialog = dialog;
     dialog->show();  // showing the dialog gives it its size
