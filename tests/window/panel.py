@@ -1,5 +1,6 @@
-"""By mouse, as the guide says it: from a shown volume to a VDI in two clicks, its opacity edited, Auto and its undo, saved as
-data and as a state, the trace replayed and the state loaded. Leaves a screenshot of each step in VDI_TEST_OUTPUT."""
+"""By mouse, as the guide says it: from a shown volume to a VDI in two clicks, its opacity edited, an edit cancelled, Auto and
+its undo, saved as data and as a state, the trace replayed and the state loaded. Leaves a screenshot of each step in
+VDI_TEST_OUTPUT."""
 
 import functools
 import os
@@ -62,6 +63,41 @@ def estimates(window, begin):
     wait_for("the first estimate again", lambda: window.text_that_begins(begin) == line)
     print("25 supersegments: %s; 50: %s" % (line, more), flush=True)
     return line
+
+
+def saved(window, name):
+    """The bytes of the VDI's file, which doesn't stay: it would make the lists of files longer."""
+    window.save("Save Data...", path(name))
+    data = bytes_of(path(name))
+    os.remove(path(name))
+    return data
+
+
+def edit_opacity(window, panel, start, end):
+    """Drags a point of the opacity, and waits until the VDI has been made anew."""
+    window.drag(start, end, steps=15)
+    wait_for("new VDI", lambda: window.is_making(panel), 30)
+    wait_for("end of making the VDI", lambda: not window.is_making(panel), 120)
+
+
+def close_and_cancel(window, panel, below):
+    """Closing the editor keeps its edits. Cancel takes back those since it was opened. The opacity's last point is `below`
+    pixels below its first place."""
+    made = saved(window, "before_close.vdi")
+    right, top = window.edit_colors()
+    edit_opacity(window, panel, (right, top + below), (right, top + 30))
+    window.close_dialog(COLOR_EDITOR)
+    check(not window.has(COLOR_EDITOR, "dialog"), "Alt+F4 closes the editor")
+    kept = saved(window, "closed.vdi")
+    check(kept != made, "closing the editor keeps its edit")
+    right, top = window.edit_colors()
+    edit_opacity(window, panel, (right, top + 30), (right, top + 80))
+    check(saved(window, "before_cancel.vdi") != kept, "another edit gives another VDI")
+    editor = window.find(COLOR_EDITOR, "dialog")
+    window.click(window.find("Rescale to data range", within=editor))
+    window.click(window.find("Cancel", "push button", within=editor))
+    check(saved(window, "cancelled.vdi") == kept, "Cancel takes back an edit of the opacity, and Rescale to data range")
+    window.wait_for_picture()
 
 
 def regenerate_in_2d(window):
@@ -180,6 +216,7 @@ def first_session(window):
     check(not window.has(COLOR_EDITOR, "dialog"), "the editor closes where nothing is shown")
     window.select(2)
     panel = window.find("Properties", "frame")
+    close_and_cancel(window, panel, 60)
 
     window.drag((x + width // 2, y + height // 2), (x + width // 2 - 60, y + height // 2 + 30))
     time.sleep(1)
