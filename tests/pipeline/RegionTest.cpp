@@ -106,12 +106,8 @@ TEST_CASE("region: the blocks don't show, however far the outermost samples reac
   // The region ends shortly behind a face between blocks, where a ray's last sample reaches farther than the
   // block in front has values.
   const glm::ivec3 size{17, 17, 17};
-  const auto decompose = [&](const glm::ivec3& count) {
-    return test::decompose("turbulence", size, count, Layout::OnOneRank, Joint::SharedPoints, ScalarType::F32,
-                           0, 1);
-  };
-  const auto whole = decompose({1, 1, 1});
-  const auto many = decompose({2, 2, 2});
+  const auto whole = test::onOneRank("turbulence", size);
+  const auto many = test::onOneRank("turbulence", size, {2, 2, 2});
   VdiGenerator generator(test::device(), comm::Communicator::serial());
   generator.setBlocks(whole.mine);
   const Box bounds = generator.scene().bounds;
