@@ -106,8 +106,10 @@ void setUpScene() {
   rayLeave = params.first + (grazes ? leave : clamp(leave, last, last + params.step));
   rayLeave = max(rayLeave, rayEnter + 0.001 * params.step);
   // No block has values farther away, so the picture would depend on which block owns the sample.
-  rayBegin = max((rayEnter - params.first) / params.step, middleOf(rayScene.x) - params.reach);
-  rayEnd = min((rayLeave - params.first) / params.step, middleOf(rayScene.y) - 1.0 + params.reach);
+  vec3 size = abs(rayDirection);
+  float reach = max(params.reach / max(max(size.x, size.y), size.z), 0.5);
+  rayBegin = max((rayEnter - params.first) / params.step, middleOf(rayScene.x) - reach);
+  rayEnd = min((rayLeave - params.first) / params.step, middleOf(rayScene.y) - 1.0 + reach);
 }
 
 // Pages beyond pageCount cost nothing: comparing with a specialisation constant removes them.

@@ -66,7 +66,7 @@ struct CastParams {
   vec3 startRight;
   float first;  // depth of the lattice's front
   vec3 startUp;
-  float reach;  // the farthest place from its middle, in samples, at which a slab is classified (outermostReach)
+  float reach;  // outermostReach
   vec3 directionBase;
   float enough;  // optical depth at which a ray ends
   vec3 directionRight;

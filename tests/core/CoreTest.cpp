@@ -394,7 +394,7 @@ TEST_CASE("transfer functions are piecewise linear, with steps, constant outside
   function.opacities = {{0.0, 0.0}, {1.0, 0.0}, {1.0001, 1.0}, {1.0002, 0.0}, {2.0, 0.0}};
   const TransferTable narrow = bake(function);
   CHECK(narrow.visible(0.9, 1.1));
-  CHECK(narrow.lookup(1.0001).extinction == maxExtinction);
+  CHECK(narrow.lookup(1.0001).extinction > 5.0F);
   CHECK_FALSE(narrow.visible(0.1, 0.9));
   function.opacities = {{1.0, 0.0}, {0.0, 1.0}};
   CHECK_THROWS_AS(bake(function), Error);
@@ -448,13 +448,14 @@ TEST_CASE("transfer functions: nothing is too narrow for the table") {
   function.opacities.back().opacity = 0.01;
   const TransferTable both = bake(function);
   const double perEntry = (both.max - both.min) / static_cast<double>(both.entries.size() - 1);
-  double sum = 0.0;
-  for (std::size_t i = 0; i * perEntry < 1000.0; ++i) sum += both.entries[i].extinction * perEntry;
+  double sum = 0.5 * both.entries[0].extinction * perEntry;  // half of it lies in the table
+  for (std::size_t i = 1; static_cast<double>(i) * perEntry < 1000.0; ++i)
+    sum += both.entries[i].extinction * perEntry;
   double exact = 0.0;
   constexpr int steps = 4000;
   for (int i = 0; i < steps; ++i)
     exact += 4.0 / steps * -std::log2(1.0 - function.opacityAt(20.0 + 4.0 * (i + 0.5) / steps));
-  CHECK(sum == Approx(exact).epsilon(0.15));
+  CHECK(sum == Approx(exact).epsilon(0.05));
 }
 
 TEST_CASE("who owns what: points to the last point, cells whole, ghosts never") {

@@ -167,6 +167,11 @@ class FakeSocket {
 }
 
 const soon = (milliseconds = 0) => new Promise((resolve) => setTimeout(resolve, milliseconds));
+/** Waits until the decoder has nothing left, however slow the machine is. */
+const settled = async (/** @type {Live} */ live) => {
+  await soon(20);
+  while (live.isDecoding) await soon(5);
+};
 
 /** A connection whose decoder takes `decodeMs` milliseconds, and a file's first byte for the VDI. */
 function connection(decodeMs = 5) {
@@ -205,9 +210,9 @@ async function testConnection() {
   sockets[0].text({...welcome, series: null});
   check(live.state === "waiting", "welcome without frames");
   sendLevel(sockets[0], 7, 0, 1);
-  await soon(20);
+  await settled(live);
   sendLevel(sockets[0], 7, 1, 2);
-  await soon(20);
+  await settled(live);
   check(shown.join() === "1,2" && live.state === "live", `levels in their order, not ${shown}`);
   const ends = sockets[0].sent.filter((m) => m.type === "ack");
   check(ends.length === 2 && ends[1].frame === 7 && ends[1].level === 1 && ends[1].bytes === 4, "acknowledgements of levels' ends");
@@ -218,10 +223,10 @@ async function testConnection() {
   check(shown.join() === "1,2,3,8", `newest wins: ${shown}`);
 
   sendLevel(sockets[0], 30, 0, 255);
-  await soon(20);
+  await settled(live);
   check(live.state === "live" && live.cause !== "" && live.shown?.frame === 16, "a damaged file costs nothing but itself");
   sendLevel(sockets[0], 31, 1, 9);
-  await soon(20);
+  await settled(live);
   check(live.cause === "" && live.shown?.frame === 31, "the frame after a damaged file is shown");
 
   // Acknowledgements of a large level.
@@ -328,7 +333,7 @@ async function testSeries() {
   sockets[0].text({type: "series", from: 3, times: [1], steps: [3]});
   check(wishes() === "show3", "a frame is asked for once it is there");
   sendLevel(sockets[0], 3, 1, 1);
-  await soon(20);
+  await settled(live);
   live.pause();
   live.show(1);
   live.follow();
@@ -343,37 +348,37 @@ async function testChosenFrame() {
   sockets[0].text(welcome);
   live.show(1);
   sendLevel(sockets[0], 1, 1, 11);
-  await soon(20);
+  await settled(live);
   sockets[0].end(1006);
   live.connect();
   sockets[1].open();
   sockets[1].text(welcome);
   sendLevel(sockets[1], 2, 1, 21);
-  await soon(20);
+  await settled(live);
   check(shown.join() === "11" && live.shown?.frame === 1, `the newest frame isn't shown in place of the chosen one: ${shown}`);
   check(sockets[1].sent.some((m) => m.type === "ack" && m.frame === 2 && m.bytes === 4), "but it is acknowledged");
   sendLevel(sockets[1], 1, 1, 12);
   sockets[1].text({type: "missing", frame: 1, cause: "gone"});
-  await soon(20);
+  await settled(live);
   sendLevel(sockets[1], 2, 1, 22);
-  await soon(20);
+  await settled(live);
   check(shown.join() === "11,12,22", `the newest frame in place of one that is gone: ${shown}`);
   live.show(0);
   sendLevel(sockets[1], 2, 1, 24);
-  await soon(20);
+  await settled(live);
   check(shown.length === 3, "another frame than the chosen one");
   live.follow();
-  await soon(20);
+  await settled(live);
   check(shown.pop() === 24, "a frame that was put aside is shown once it is wanted, as the server won't send it again");
   live.shown = undefined;
   live.show(0);
   sendLevel(sockets[1], 2, 1, 25);
   sockets[1].text({type: "missing", frame: 0, cause: "gone"});
-  await soon(20);
+  await settled(live);
   check(shown.pop() === 25, "the newest frame where there is nothing else to show");
   live.wanted = 7;
   sendLevel(sockets[1], 2, 1, 23);
-  await soon(20);
+  await settled(live);
   check(shown.pop() === 23, "the newest frame while the series hasn't the chosen one");
   live.close();
 }
@@ -395,7 +400,7 @@ async function testPause() {
   };
   const give = async (/** @type {number} */ frame, /** @type {number} */ index) => {
     sendLevel(socket, frame, index, 10 * frame + index);
-    await soon(20);
+    await settled(live);
   };
   const asked = () => socket.sent.filter((m) => m.type === "pause" || m.type === "resume").map((m) => m.type).join();
   const acks = (/** @type {number} */ frame) =>
@@ -412,7 +417,7 @@ async function testPause() {
   await give(2, 1);
   check(seen() === "" && acks(2) === 2 && live.shown?.frame === 1, "another frame is acknowledged, and not shown");
   live.follow();
-  await soon(20);
+  await settled(live);
   check(seen() === "21" && asked() === "pause,resume",
         "another frame is shown after the pause, as the server won't send it again");
 
@@ -421,7 +426,7 @@ async function testPause() {
   socket.text({...level, frame: 4, level: 0, bytes: 4});
   check(asked() === "pause,resume,pause", `the server has gone on to another frame: ${asked()}`);
   socket.bytes(part(4, 0, 0, new Uint8Array([40, 0, 0, 0])));
-  await soon(20);
+  await settled(live);
   check(seen() === "30" && acks(4) === 1, "another frame is acknowledged, and kept off in the pause");
 
   check(reconnect({}) === null && asked() === "", "a coarse frame may become full after a reconnect");
@@ -445,15 +450,15 @@ async function testPause() {
   await give(5, 1);
   live.follow();
   check(live.shown === undefined, "the former run's frame counts for nothing after the pause");
-  await soon(20);
+  await settled(live);
   check(seen() === "51" && live.shown?.frame === 5, "the new run's frame follows");
 
   sendLevel(socket, 7, 0, 70);
   live.pause();
-  await soon(20);
+  await settled(live);
   check(seen() === "" && live.shown?.frame === 5, "a pause keeps off the level that the decoder works on");
   live.show(7);
-  await soon(20);
+  await settled(live);
   check(seen() === "70" && !live.isPaused, "a frame that was held back is asked for");
 
   live.pause();
@@ -502,7 +507,7 @@ async function testEndedRun() {
   sockets[0].text({...welcome, series: null});
   sockets[0].text({type: "state", state: "live", viewers: 1});
   sendLevel(sockets[0], 4, 0, 7);
-  await soon(20);
+  await settled(live);
   const line = liveText(live, performance.now());
   for (const [what, word] of [["state", "Live"], ["step", "step "], ["age", "s old"], ["level", "level 1 of 2"], ["rate", "MiB/s"]])
     check(line.includes(word), `the line of a live run has the ${what}: ${line}`);
@@ -537,13 +542,13 @@ async function testLostSource() {
   sockets[0].text({...welcome, series: null});
   sockets[0].text({type: "state", state: "live", viewers: 1});
   sendLevel(sockets[0], 4, 0, 7);
-  await soon(20);
+  await settled(live);
   const [line, light] = [() => liveText(live, performance.now()), () => document.getElementById("live")?.dataset.state];
   check(light() === "live", `a relay that gets frames: ${light()}`);
   sockets[0].text({type: "state", state: "waiting", viewers: 1, cause: "the source doesn't answer"});
   check(light() === "waiting" && line().includes("the source doesn't answer"), `a relay without a source: ${light()}, ${line()}`);
   sendLevel(sockets[0], 4, 1, 8);
-  await soon(20);
+  await settled(live);
   check(light() === "waiting" && line().includes("the source doesn't answer"), `a frame that the relay has kept: ${light()}, ${line()}`);
   sockets[0].text({type: "state", state: "live", viewers: 1});
   check(light() === "live" && !line().includes("source"), `the source is back: ${light()}, ${line()}`);
@@ -578,7 +583,7 @@ async function testMissingFrames() {
   }
   shown = panel.show(0);
   sendLevel(sockets[0], 0, 0, 7);
-  await soon(20);
+  await settled(live);
   sendLevel(sockets[0], 0, 1, 255);
   check(await ending(shown) === "shown", `the coarse level is on show: ${await ending(shown)}`);
 

@@ -166,7 +166,7 @@ def told(folder, driver, paused_at, camera):
     check(given[after][0] == 0.8125 and given[after + 1][0] == 0.125,
           "a parameter that changes while the simulation waits is in force after that step")
     values_in_force = [entry["in_force"] for entry in in_force]
-    check(values_in_force == ([{"level": 0.8125, "waves": 5}, {"level": 0.125}] if ISOLATED else []),
+    check(values_in_force == ([{"level": 0.8125, "waves": 5}, {"level": 0.125}, {"stop": 1}] if ISOLATED else []),
           "the log says when an isolated simulation has the values: %s" % values_in_force)
     if script == "json":
         in_files(folder, at, paused_at)

@@ -62,28 +62,19 @@ bool floatsResolve(const DepthLattice& lattice) {
   return lattice.first <= farthest * lattice.step;
 }
 
-namespace {
-
-/// The longest component of any ray's direction, which is linear in the pixel's coordinates.
-double longestComponent(const View& view) {
-  double longest = 0.0;
+bool samplesAreSlabs(const Scene& scene, const View& view, const DepthLattice& lattice) {
+  double longest = 0.0;  // component of any ray's direction, which is linear in the pixel's coordinates
   for (int corner = 0; corner < 4; ++corner) {
     const Ray ray =
         view.rayThrough((corner & 1) != 0 ? view.width() : 0.0, (corner & 2) != 0 ? view.height() : 0.0);
     const glm::dvec3 size = glm::abs(ray.direction);
     longest = std::max({longest, size.x, size.y, size.z});
   }
-  return longest;
+  return 0.5 * lattice.step * longest <= slabReach * scene.minSpacing;
 }
 
-}  // namespace
-
-bool samplesAreSlabs(const Scene& scene, const View& view, const DepthLattice& lattice) {
-  return 0.5 * lattice.step * longestComponent(view) <= slabReach * scene.minSpacing;
-}
-
-double outermostReach(const Scene& scene, const View& view, const DepthLattice& lattice) {
-  return std::max(valueReach * scene.minSpacing / (lattice.step * longestComponent(view)), 0.5);
+double outermostReach(const Scene& scene, const DepthLattice& lattice) {
+  return valueReach * scene.minSpacing / lattice.step;
 }
 
 }  // namespace vdi

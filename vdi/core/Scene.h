@@ -54,9 +54,10 @@ inline constexpr double slabReach = 0.9;
 /// sample per voxel on.
 bool samplesAreSlabs(const Scene& scene, const View& view, const DepthLattice& lattice);
 
-/// The farthest place from its middle, in samples, at which a slab may be classified: blocks have values up
-/// to there (valueReach). The ends of inner samples are half a sample away, but the outermost sample of a ray
-/// may reach to the bounds, a whole sample away. It has the material of the nearest place in reach.
-double outermostReach(const Scene& scene, const View& view, const DepthLattice& lattice);
+/// The distance from its middle up to which a sample may be classified, because blocks have values up to
+/// there (valueReach): in samples of a ray along an axis. A ray whose direction's longest component is c has
+/// 1/c of it. The ends of slabs are nearer, but the outermost sample of a ray may reach farther, to the
+/// bounds. It has the material of the nearest place in reach.
+double outermostReach(const Scene& scene, const DepthLattice& lattice);
 
 }  // namespace vdi

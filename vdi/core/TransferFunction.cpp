@@ -125,7 +125,7 @@ glm::dvec4 entryAt(const TransferFunction& function, double x) {
   return {function.colorAt(x) * extinction, extinction};
 }
 
-/// The mean of the function over [lo, hi], with the nodes between as breakpoints.
+/// The mean of the function over [lo, hi], by Simpson's rule between nodes.
 glm::dvec4 meanOver(const TransferFunction& function, const std::vector<double>& nodes, double lo,
                     double hi) {
   glm::dvec4 sum(0.0);
@@ -133,7 +133,9 @@ glm::dvec4 meanOver(const TransferFunction& function, const std::vector<double>&
   const auto add = [&](double to) {
     // The values just inside: at a step, the function has another value on each side.
     const double inset = 1e-9 * (to - from);
-    sum += 0.5 * (to - from) * (entryAt(function, from + inset) + entryAt(function, to - inset));
+    const glm::dvec4 middle = entryAt(function, 0.5 * (from + to));
+    sum +=
+        (to - from) / 6.0 * (entryAt(function, from + inset) + 4.0 * middle + entryAt(function, to - inset));
     from = to;
   };
   for (auto node = std::upper_bound(nodes.begin(), nodes.end(), lo); node != nodes.end() && *node < hi;
@@ -154,7 +156,8 @@ TransferTable bake(const TransferFunction& transferFunction) {
   table.unitDistance = unitDistance;
   table.min = std::min(colors.front().x, opacities.front().x);
   table.max = std::max(colors.back().x, opacities.back().x);
-  const double closest = closestNodes(opacities, opaque, closestNodes(colors, hues, table.max - table.min));
+  const double closest =
+      closestNodes(opacities, opaque, closestNodes(colors, hues, std::numeric_limits<double>::infinity()));
   const auto resolves = [&](std::size_t size) {
     return closest * static_cast<double>(size - 1) >= 2.0 * (table.max - table.min);
   };

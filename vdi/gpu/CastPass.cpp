@@ -49,7 +49,7 @@ shared::CastParams castGeometry(const Scene& scene, const View& view, const Dept
   params.first = static_cast<float>(lattice.first);
   params.sampleCount = lattice.count;
   params.slabs = samplesAreSlabs(scene, view, lattice) ? 1U : 0U;
-  params.reach = static_cast<float>(outermostReach(scene, view, lattice));
+  params.reach = static_cast<float>(outermostReach(scene, lattice));
   for (int axis = 0; axis < 3; ++axis) {
     params.sceneLo[axis] = snapToScene(scene, scene.bounds.lo[axis], axis);
     params.sceneHi[axis] = snapToScene(scene, scene.bounds.hi[axis], axis);

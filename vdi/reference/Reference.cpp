@@ -153,7 +153,7 @@ RayInputs::RayInputs(const Scene& theScene, const Camera& camera, const Transfer
       table(bake(transferFunction)),
       settings(theSettings),
       slabs(samplesAreSlabs(theScene, view, lattice)),
-      reach(static_cast<float>(outermostReach(theScene, view, lattice))),
+      reach(static_cast<float>(outermostReach(theScene, lattice))),
       slabTable(makeSlabTable(table, slabLength(lattice, table))),
       isosurfaces(isosurfacesOf(theSettings.blending, table)) {
   validate(theSettings);
@@ -206,14 +206,15 @@ class SampledRay {
   float lengthPerDepth() const { return glm::length(ray_.direction); }
 
  private:
-  /// The start of sample k: samples at the scene's faces are shorter or longer. No block has values farther
-  /// than `reach` from a sample's middle.
+  /// The start of sample k: samples at the scene's faces are shorter or longer, as far as blocks have values.
   float placeOf(std::uint32_t k) const {
     const auto front = static_cast<float>(inputs_.lattice.first);
+    const glm::vec3 size = glm::abs(ray_.direction);
+    const float reach = std::max(inputs_.reach / std::max({size.x, size.y, size.z}), 0.5F);
     if (k == scene_.samples.first)
-      return std::max((scene_.enter - front) / ray_.step, ray_.middleOf(k) - inputs_.reach);
+      return std::max((scene_.enter - front) / ray_.step, ray_.middleOf(k) - reach);
     if (k == scene_.samples.last)
-      return std::min((scene_.leave - front) / ray_.step, ray_.middleOf(k) - 1.0F + inputs_.reach);
+      return std::min((scene_.leave - front) / ray_.step, ray_.middleOf(k) - 1.0F + reach);
     return static_cast<float>(k);
   }
   glm::dvec3 worldAt(float place) const { return glm::dvec3(ray_.at(place)) + inputs_.scene.bounds.center(); }
