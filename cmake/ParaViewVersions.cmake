@@ -5,6 +5,8 @@
 #   VDI_PLUGIN_HELP    whether this ParaView makes the help of a plugin's panel
 #   VDI_GL_LOADER      the VTK target that loads OpenGL's functions
 #   VDI_NEEDS_DISPLAY  whether its views need an X server; ParaView 6 draws them without one, too
+#   VDI_CONVERTS_ARRAYS  whether a filter that asks for cell data gets them from the points of a simulation's blocks, as
+#                      from ParaView 6 on
 #   VDI_PLUGIN_UNITY   whether a unity build compiles the plugin's sources together
 
 # vdi_pass_over_python_modules(<folder of a ParaView's CMake files>): makes CMake accept Debian 13's
@@ -53,12 +55,14 @@ if(VDI_QT STREQUAL "Qt6" AND ParaView_VERSION VERSION_LESS 6)
   set(VDI_PLUGIN_HELP OFF)
 endif()
 set(VDI_NEEDS_DISPLAY ON)
+set(VDI_CONVERTS_ARRAYS OFF)
 set(VDI_PLUGIN_UNITY "${CMAKE_UNITY_BUILD}")
 if(ParaView_VERSION VERSION_GREATER_EQUAL 5.12)
   set(VDI_PLUGIN_UNITY OFF) # the header that it generates has no include guard
 endif()
 if(ParaView_VERSION VERSION_GREATER_EQUAL 6)
   set(VDI_NEEDS_DISPLAY OFF)
+  set(VDI_CONVERTS_ARRAYS ON)
 endif()
 set(VDI_GL_LOADER VTK::glew)
 if(TARGET VTK::glad)

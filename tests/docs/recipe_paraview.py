@@ -34,7 +34,7 @@ def save_state():
     presets = vtkSMTransferFunctionPresets.GetInstance()
     names = [presets.GetPresetName(index) for index in range(presets.GetNumberOfPresets())]
     with open("viridis.json", "w") as file:
-        file.write("[%s]" % presets.GetPresetAsString(names.index("Viridis (matplotlib)")))
+        file.write("[%s]" % presets.GetPresetAsString([name.split()[0] for name in names].index("Viridis")))
     sys.argv[1:] = ["sample.vti", "state.py"]
     runpy.run_path(SCRIPT)
 

@@ -17,7 +17,7 @@ ISOLATED = os.environ.get("VDI_ISOLATION") == "process"
 CAMERA = {"position": [18, 20, 60], "focal_point": [18, 6, 6]}
 RUN = {"field": "V", "camera": CAMERA, "resolution": [96, 54], "output": "v_{timestep:06d}.vdi", "log": "run.jsonl",
        "colors": {"range": [0, 1], "opacities": [[0, 0], [1, 1]]}, "stream": {"steer": True}}
-PRESETS = ["bands", "haze"] if script == "json" else ["X Ray", "Viridis (matplotlib)"]
+PRESETS = ["bands", "haze"] if script == "json" else ["X Ray", "Viridis"]  # ParaView 5's have more to their names
 PATIENCE = 150
 
 
@@ -105,7 +105,8 @@ def drive(port, token, folder):
     steering(driver, lambda message: message["paused"])
     time.sleep(0.5)
     before = lines(folder / "parameters_0.txt")
-    driver.send(type="steer", resolution=[64, 48], preset=PRESETS[1])
+    preset = next(name for name in now["generator"]["presets"] if name.startswith(PRESETS[1]))
+    driver.send(type="steer", resolution=[64, 48], preset=preset)
     now = steering(driver, lambda message: message["generator"]["resolution"] == [64, 48])
     check(now["generator"]["range"] == [0.25, 0.75], "another colour map has the range that there is: %s" % now)
     again = level(driver, lambda announced: announced["width"] == 64)

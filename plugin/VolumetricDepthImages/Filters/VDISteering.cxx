@@ -59,12 +59,12 @@ vtkSMProxy* GeneratorOf(vtkSMProxy* consumer) {
   return nullptr;
 }
 
-/// The names of the offered presets that this ParaView has.
+/// The names of the offered presets that this ParaView has. ParaView 6 has shorter ones.
 std::vector<std::string> Presets() {
   std::vector<std::string> names;
   for (const char* const name :
-       {"Cool to Warm (Extended)", "Viridis (matplotlib)", "Inferno (matplotlib)", "Plasma (matplotlib)",
-        "Turbo", "Black-Body Radiation", "Rainbow Uniform", "X Ray"}) {
+       {"Cool to Warm (Extended)", "Viridis (matplotlib)", "Viridis", "Inferno (matplotlib)", "Inferno",
+        "Plasma (matplotlib)", "Plasma", "Turbo", "Black-Body Radiation", "Rainbow Uniform", "X Ray"}) {
     if (vtkSMTransferFunctionPresets::GetInstance()->HasPreset(name)) names.emplace_back(name);
   }
   return names;
