@@ -148,7 +148,8 @@ with Session() as session:
     check("what makes it has failed" in pvtest.message_in(view), "the view says that the server has failed")
     image.BlendMode = "Composite"
     simple.Render(view)
-    check(pvtest.message_in(view) == "" and pvtest.ssim(screenshot(view, "client_server_again.png"), alone) > 0.99,
+    picture = pvtest.screenshot(view, "client_server_again.png", SIZE)
+    check(pvtest.message_in(view) == "" and pvtest.ssim(picture, alone) > 0.99,
           "after the server has failed, its next VDI is shown")
 
 with open(LOG) as log:
