@@ -11,8 +11,8 @@
 #include <array>
 #include <cassert>
 #include <cerrno>
-#include <cstdio>
 #include <csignal>
+#include <cstdio>
 #include <optional>
 #include <random>
 #include <system_error>
