@@ -228,8 +228,8 @@ def install(leave, plugin):
             file = os.path.join(folders.get(owners.get(extractor.SMProxy, ""), ""), name)
             if key not in told_of and last_files.get(key) != file and os.path.isfile(file):
                 told_of.add(key)
-                vtkLogger.Log(vtkLogger.VERBOSITY_WARNING, "script", 0, "'%s' is an earlier run's file; this run replaces it and "
-                              "the others of its kind" % file)
+                vtkLogger.Log(vtkLogger.VERBOSITY_WARNING, "script", 0, "'%s' is an earlier run's file; this run replaces it "
+                              "and the others of its kind" % file)
             last_files[key] = file
 
     def has_display(extractor):

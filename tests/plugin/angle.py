@@ -1,7 +1,6 @@
 """Windows, which pvpython has, say how far the view is turned from the VDI's viewpoint; pictures that are taken leave it
 out. representation.py tells that pvbatch does, too."""
 
-import os
 
 import numpy as np
 import pvtest
