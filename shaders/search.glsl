@@ -58,32 +58,31 @@ SearchResult searchList(bool write, float known, uint budget) {
   SearchResult best = SearchResult(largestSensitivity, 0u);
   float sensitivity = write ? known : smallestSensitivity;
   // Try 0 is the first one, try 1 the one that always fits, and the others bisect. A single loop has only one
-  // copy of feedIntervals.
-  // It ends by its number of tries when writing, too: with a return here, compact lists never end on lavapipe
-  // of Mesa 26.1.
+  // copy of feedIntervals. It ends by its condition alone: with jumps out of it, some programs never end on
+  // lavapipe of Mesa 26.1.
   int tries = write ? 1 : maxTries + 2;
-  for (int i = 0; i < tries; ++i) {
+  bool done = false;
+  for (int i = 0; i < tries && !done; ++i) {
     uint count = searchTry(sensitivity);
+    SearchResult now = SearchResult(sensitivity, count);
     if (write) {
-      best = SearchResult(sensitivity, count);
-      break;
-    }
-    if (i == 0) {
+      best = now;
+    } else if (i == 0) {
       maxCount = cutAtGaps ? max(budget, search.runs) : budget;
-      if (search.visible <= maxCount) return SearchResult(-1.0, search.visible);
-      if (count <= maxCount) return SearchResult(sensitivity, count);
+      bool allFit = search.visible <= maxCount;
+      if (allFit) best = SearchResult(-1.0, search.visible);
+      if (!allFit && count <= maxCount) best = now;
+      done = allFit || count <= maxCount;
       sensitivity = largestSensitivity;
-      continue;
-    }
-    if (count <= maxCount) {
-      fits = sensitivity;
-      best = SearchResult(sensitivity, count);
-      if (i > 1 && float(count) >= goodFill * float(maxCount)) break;
     } else {
-      tooFine = sensitivity;
+      bool isEnough = count <= maxCount;
+      if (isEnough) best = now;
+      fits = isEnough ? sensitivity : fits;
+      tooFine = isEnough ? tooFine : sensitivity;
+      bool isGood = isEnough && i > 1 && float(count) >= goodFill * float(maxCount);
+      done = isGood || !(fits > closeBounds * tooFine);
+      sensitivity = sqrt(tooFine * fits);
     }
-    if (!(fits > closeBounds * tooFine)) break;
-    sensitivity = sqrt(tooFine * fits);
   }
   return best;
 }
