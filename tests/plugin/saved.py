@@ -1,6 +1,7 @@
 """What ParaView saves of a filter: the defaults of later filters, and scripts that make the same VDI anew."""
 
 import os
+import re
 import sys
 
 import numpy as np
@@ -59,6 +60,13 @@ def defaults():
 DISPLAY = dict(Shade=1, Diffuse=0.6, UseCropping=1, CroppingScale=[0.5, 0.6, 0.7])
 
 
+def sets(script, name, setting):
+    """Whether the script sets it, each property by itself, or with others by Set, as from ParaView 6 on."""
+    together = "".join(re.findall(r"^%s\.Set\((.*?)^\)" % name, script, re.MULTILINE | re.DOTALL))
+    return bool(re.search(r"^%s\.%s = " % (name, setting), script, re.MULTILINE) or
+                re.search(r"^ *%s=" % setting, together, re.MULTILINE))
+
+
 def python_state():
     """A script leaves out values that are the default. The volume's own display settings mustn't take their place."""
     wavelet, view = shown_wavelet()
@@ -72,7 +80,8 @@ def python_state():
     simple.AddLight(view=view).Coords = "Headlight"
     expected = pvtest.picture(image)
     script = smstate.get_state()
-    check(expected.max() > 60 and "vdi.Resolution" in script and ".Shade = 1" in script and "vdi.Shade" not in script,
+    check(expected.max() > 60 and sets(script, "vdi", "Resolution") and not sets(script, "vdi", "Shade")
+          and sets(script, r"\w+", "Shade"),
           "the state has the VDI's size, and the volume's shading alone")
     simple.ResetSession()
     exec(script, {})

@@ -42,7 +42,9 @@ void VdiDecoder::State::add(std::span<const std::byte> bytes) {
     const std::span<const std::byte> rest = bytes.subspan(use(bytes));
     pending.assign(rest.begin(), rest.end());
   } else {
-    pending.insert(pending.end(), bytes.begin(), bytes.end());
+    const std::size_t before = pending.size();
+    pending.resize(before + bytes.size());  // GCC 14 takes insert for an overflow
+    std::copy(bytes.begin(), bytes.end(), pending.begin() + static_cast<std::ptrdiff_t>(before));
     pending.erase(pending.begin(), pending.begin() + static_cast<std::ptrdiff_t>(use(pending)));
   }
 }
