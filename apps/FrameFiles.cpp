@@ -15,6 +15,7 @@
 #include "vdi/core/Error.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/VdiFile.h"
+#include "vdi/io/VdiParts.h"
 
 namespace vdi::apps {
 
@@ -142,13 +143,12 @@ void FrameFiles::tellIncomplete() {
 
 /// Throws Error as io::readVdiInfo does.
 FrameFiles::Content FrameFiles::contentOf(const std::filesystem::path& file) {
-  constexpr std::size_t headerBytes = 240;  // docs/format.md
   Content content;
   content.look = lookAt(file).value_or(FileLook());  // before reading, so that a later change shows
   const Vdi header = io::readVdiInfo(file).header;
   if (std::isfinite(header.time)) content.time = header.time;
   content.step = header.timeStep;
-  content.header = io::InputFile(file).read(0, headerBytes);
+  content.header = io::InputFile(file).read(0, io::fileHeaderBytes);
   return content;
 }
 

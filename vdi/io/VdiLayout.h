@@ -74,7 +74,7 @@ static_assert(offsetof(Header, viewAngle) == 208);
 static_assert(offsetof(Header, parallelScale) == 216);
 static_assert(offsetof(Header, tableChecksum) == 224);
 static_assert(offsetof(Header, headerChecksum) == 232);
-static_assert(sizeof(Header) == 240);
+static_assert(sizeof(Header) == fileHeaderBytes);
 
 /// Precedes the metadata, which are the file's last part.
 struct MetadataHeader {

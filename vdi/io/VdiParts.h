@@ -12,6 +12,9 @@
 
 namespace vdi::io {
 
+/// The header at the file's beginning. It has a checksum of the chunk table, which has those of all chunks.
+inline constexpr std::size_t fileHeaderBytes = 240;
+
 /// Lists in each chunk; the last chunk of a file may have fewer.
 inline constexpr std::uint64_t listsPerChunk = 4096;
 constexpr std::uint64_t chunksOf(std::uint64_t lists, std::uint64_t perChunk = listsPerChunk) {
