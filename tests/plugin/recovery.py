@@ -2,24 +2,14 @@
 
 import os
 import shutil
-import sys
 
 import numpy as np
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import pvtest  # noqa: E402
-from paraview import simple  # noqa: E402
-from pvtest import check  # noqa: E402
+import pvtest
+from paraview import simple
+from pvtest import check
 
 SIZE, FAILED = [160, 120], "what makes it has failed"
-
-
-def seen_in(view):
-    path = os.path.join(pvtest.OUTPUT, "recovery_{}.png".format(os.getpid()))
-    simple.SaveScreenshot(path, view, ImageResolution=SIZE)
-    picture = pvtest.read_png(path)
-    os.remove(path)
-    return picture
 
 
 def is_made(image):
@@ -40,7 +30,7 @@ for kind in ("VDI", "Outline", "Slice"):
     simple.Render(view)  # the first picture of a view moves its camera
     view.CameraPosition, view.CameraFocalPoint = [40, 30, 50], [0, 0, 0]
     for attempt in ("first", "second"):
-        expected = seen_in(view)
+        expected = pvtest.screenshot(view, None, SIZE)
         image.BlendMode = "Maximum Intensity"
         simple.Render(view)
         check(not is_made(image), "{}: the {} update fails".format(kind, attempt))
@@ -49,7 +39,7 @@ for kind in ("VDI", "Outline", "Slice"):
         image.BlendMode = "Composite"
         simple.Render(view)
         check(is_made(image), "{}: the view makes the VDI after the {} failure".format(kind, attempt))
-        check(expected.std() > 3 and same(seen_in(view), expected) and not pvtest.message_in(view),
+        check(expected.std() > 3 and same(pvtest.screenshot(view, None, SIZE), expected) and not pvtest.message_in(view),
               "{}: the view shows the VDI after the {} failure".format(kind, attempt))
     simple.SaveData(os.path.join(pvtest.OUTPUT, "recovery_{}.vdi".format(kind)), proxy=image)
     simple.Delete(view)
@@ -62,7 +52,7 @@ view = pvtest.make_view(SIZE, [40, 30, 50], [0, 0, 0])
 simple.Show(reader, view)
 simple.Render(view)
 view.CameraPosition, view.CameraFocalPoint = [40, 30, 50], [0, 0, 0]
-expected = seen_in(view)
+expected = pvtest.screenshot(view, None, SIZE)
 for attempt in ("first", "second"):
     os.truncate(path, os.path.getsize(path) // 2)
     simple.ReloadFiles(reader)
@@ -71,6 +61,6 @@ for attempt in ("first", "second"):
     shutil.copy(whole, path)
     simple.ReloadFiles(reader)
     simple.Render(view)
-    check(expected.std() > 5 and same(seen_in(view), expected) and not pvtest.message_in(view),
+    check(expected.std() > 5 and same(pvtest.screenshot(view, None, SIZE), expected) and not pvtest.message_in(view),
           "the view shows the file that is whole again: {} time".format(attempt))
 pvtest.finish()

@@ -1,16 +1,13 @@
 """What ParaView saves of a filter: the defaults of later filters, and scripts that make the same VDI anew."""
 
-import os
 import re
-import sys
 
 import numpy as np
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import pvtest  # noqa: E402
-from paraview import simple, smstate  # noqa: E402
-from paraview.modules.vtkRemotingServerManager import vtkSMSettings  # noqa: E402
-from pvtest import check  # noqa: E402
+import pvtest
+from paraview import simple, smstate
+from paraview.modules.vtkRemotingServerManager import vtkSMSettings
+from pvtest import check
 
 SIZE, POSITION = [120, 90], [40, 30, 50]
 
