@@ -72,7 +72,7 @@ export function liveText(live, now) {
   const isOn = state === "live" || state === "waiting" || state === "ended";
   const isSeries = live.series !== null && state === "ended";
   const isOver = isGone(live);
-  const parts = [isOn && live.isPaused ? "Paused" : isSeries ? "Series" : isOver ? "Ended" : words[state]];
+  const parts = [isOn && live.isPaused ? "Paused" : isSeries ? "Series" : words[isOver ? "ended" : state]];
   if (state === "lost" && !isOver) parts.push(live.cause, `next attempt in ${Math.max(Math.ceil((live.retryAt - now) / 1000), 0)} s`);
   else if (live.cause && !isOver) parts.push(live.cause);
   if (live.trouble) parts.push(live.trouble);
