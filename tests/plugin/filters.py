@@ -299,6 +299,8 @@ check(not np.array_equal(picture(aborted), kept), "after an abort, the next VDI 
 
 # Bad input: an error, not a crash, and the next thing works.
 check(errors_of(lambda: vdi_of(simple.Tetrahedralize(Input=wavelet)).UpdatePipeline()), "an unstructured grid is refused")
+plane = simple.Wavelet(WholeExtent=[0, 9, 0, 9, 3, 3])
+check(errors_of(lambda: vdi_of(plane).UpdatePipeline()), "data of one point along an axis are refused")
 check(errors_of(lambda: vdi_of(wavelet, CameraViewAngle=0).UpdatePipeline()), "a camera without an angle of view is refused")
 check(errors_of(lambda: vdi_of(wavelet, ("POINTS", "nothing")).UpdatePipeline()), "an array that isn't there is refused")
 check(errors_of(lambda: simple.RenderVDI(Input=wavelet).UpdatePipeline()), "RenderVDI refuses an image that is no VDI")

@@ -48,6 +48,14 @@ std::shared_ptr<Volume> firstOfAll(vtkMultiProcessController* controller,
   return *find(identities[static_cast<std::size_t>(first - everywhere.begin())]);
 }
 
+/// Collective: refuses blocks without a volume. A VDI of them would be empty, and look like a failure.
+void requireVolume(const vdi::VdiGenerator& generator, const Load& load) {
+  if (!generator.scene().bounds.empty()) return;
+  if (!generator.communicator().anyTogether([&] { return !load.blocks.empty(); })) return;
+  throw vdi::Error(vdi::ErrorCode::InvalidArgument,
+                   "the input has no volume: it needs at least two points along each axis");
+}
+
 }  // namespace
 
 std::uint64_t newIdentity(vtkMultiProcessController* controller) {
@@ -131,6 +139,7 @@ void Volume::show(const Load& load) {
   }
   try {
     generator_->setBlocks(load.blocks, load.of.fillGhosts);
+    requireVolume(*generator_, load);
     auto now = std::make_shared<const Shown>(
         Shown{.of = load.of,
               .bounds = generator_->scene().bounds,
