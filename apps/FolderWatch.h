@@ -14,7 +14,7 @@
 
 namespace vdi::apps {
 
-/// What tells that a file has changed, without reading it.
+/// Signature that shows a file's change without reading the file.
 struct FileLook {
   std::uintmax_t size = 0;
   std::filesystem::file_time_type time;

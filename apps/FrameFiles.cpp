@@ -31,7 +31,7 @@ stream::Clock::time_point writtenAt(const std::filesystem::path& file) {
   return age.count() > 0 ? now - std::chrono::duration_cast<stream::Clock::duration>(age) : now;
 }
 
-/// How long a program may take to write a file under its final name.
+/// Longest time that a program may take to write a file under its final name.
 constexpr std::chrono::seconds writingTime{1};
 constexpr char damagedOrGone[] = "the file is damaged or gone";
 

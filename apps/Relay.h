@@ -45,7 +45,7 @@ class Relay {
   std::optional<stream::Phase> phase_;            // the other server's
   stream::State told_;                            // to this server's viewers, but for their number
   std::shared_ptr<const stream::Frame> current_;  // the frame that is arriving
-  std::uint32_t firstLevel_ = 0;                  // of current_, as the other server counts
+  std::uint32_t firstLevel_ = 0;                  // current_'s first level, as the other server counts
   std::list<stream::FramePtr> whole_;             // the latest whole frames
   std::optional<std::uint32_t> newest_;
   std::optional<std::uint32_t> asked_;  // the wanted frame of the series

@@ -40,7 +40,7 @@ struct BenchOptions {
   double turn = 20.0;  // degrees
   std::vector<double> zooms{1.0, 4.0};
   std::vector<double> margins{0.0};
-  std::vector<std::string> listResolutions;  // of VDIs' pictures; empty: the views'
+  std::vector<std::string> listResolutions;  // the VDIs' resolutions; empty: those of the views
   // For the suite `stream`, which uses `turn` and `frames`, too:
   std::vector<std::string> rates{"1Gbit", "100Mbit"};  // to the viewer
   double period = 33.0;                                // milliseconds between two frames

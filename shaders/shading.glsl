@@ -20,7 +20,7 @@ float differenceOf(float ahead, float behind) {
 // zero if there is no gradient. Texels are values times a positive scale, which does not matter here.
 vec3 normalAt(Brick brick, float place) {
   vec3 middle = positionAt(place) * brick.texelScale + brick.texelOffset;
-  vec3 texels = brick.cellScale * float(cellSide);  // of the page
+  vec3 texels = brick.cellScale * float(cellSide);  // size of the page, in texels
   vec3 voxel = 1.0 / texels;
   vec3 ahead = clamp(middle + voxel, brick.texelLo, brick.texelHi);
   vec3 behind = clamp(middle - voxel, brick.texelLo, brick.texelHi);

@@ -55,7 +55,7 @@ OpticalSegment loadSegment(SegmentArray segments, uint i, StoredForm form) {
 // Rounding errors of the list's supersegments so far.
 uint storeReach;
 float storeDepth;        // optical depth so far
-float storeStoredDepth;  // of the stored supersegments
+float storeStoredDepth;  // optical depth of the stored supersegments
 float storeCarriedDepth;
 vec3 storeCarriedLight;
 

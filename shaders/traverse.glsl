@@ -56,7 +56,7 @@ struct Column {
   vec2 edges;  // progress where the ray enters and leaves it
   vec2 fractions;
   ivec2 rows;
-  float share;  // of the second one
+  float share;  // the second one's share
   uvec2 lists;
 };
 

@@ -1,4 +1,4 @@
-// How long a fuzzing test goes on, and with which damage it begins.
+// Duration of a fuzzing test, and the seed of its first damage.
 #pragma once
 
 #include <chrono>

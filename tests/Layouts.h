@@ -21,7 +21,7 @@ struct Layout {
   std::array<int, 3> axes{0, 1, 2};  // the fastest first
   std::array<int, 3> pads{0, 0, 0};  // values that are no part of the block, along each of these axes
   std::array<bool, 3> reversed{};    // x, y and z
-  int stride = 1;                    // of the fastest axis, in values
+  int stride = 1;                    // along the fastest axis, in values
   int shift = 0;                     // in bytes, of the first value
 };
 

@@ -140,7 +140,7 @@ inline std::vector<NamedFunction> namedFunctions(const Stretch& stretch) {
 /// Largest and mean difference of the channels, opacity included, in 1/255.
 struct Off {
   double largest = 0.0;
-  double mean = 0.0;    // of the worst channel
+  double mean = 0.0;    // mean of the worst channel
   double pixels = 0.0;  // share of them with a channel that's off by more than 8
 };
 

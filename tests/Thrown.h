@@ -1,4 +1,4 @@
-// What a call throws.
+// The exception that a call throws.
 #pragma once
 
 #include <exception>

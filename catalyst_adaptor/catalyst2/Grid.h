@@ -23,8 +23,8 @@ class Grid {
   using Key = std::tuple<std::int32_t, std::int32_t, std::string>;
   struct Array {
     std::int32_t type = VDI_CATALYST_F64;
-    std::vector<const void*> data;              // of each block
-    std::vector<vdi_catalyst_strides> strides;  // of each block
+    std::vector<const void*> data;              // one for each block
+    std::vector<vdi_catalyst_strides> strides;  // one for each block
   };
 
   /// Takes the place of what was there before. `data`: a domain, or any number of them, in lists or objects;

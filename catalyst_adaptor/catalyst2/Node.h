@@ -13,7 +13,7 @@ namespace vdi::catalyst {
 
 /// The numbers of a leaf, where the simulation has them.
 struct Leaf {
-  std::int32_t type = 0;  // of vdi_catalyst.h
+  std::int32_t type = 0;  // a type of vdi_catalyst.h
   std::size_t scalarBytes = 1;
   const std::byte* first = nullptr;
   std::int64_t count = 0;

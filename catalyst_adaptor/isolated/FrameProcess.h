@@ -47,7 +47,7 @@ class FrameProcess {
   /// Whether somebody has stopped the process, as by SIGSTOP.
   bool isStopped() const;
 
-  /// How many of the steps that were handed over are done.
+  /// Number of finished steps among those handed over.
   std::int64_t doneCount() const { return doneCount_; }
   /// The result of the next step that is done. There must be one.
   DoneNotice takeDone();

@@ -13,7 +13,7 @@ namespace vdi::catalyst {
 
 namespace {
 
-constexpr std::uint64_t alignment = 4096;  // of each block's values, so that they are copied by whole lines
+constexpr std::uint64_t alignment = 4096;  // each block's values begin here, so that whole lines are copied
 
 std::uint64_t aligned(std::uint64_t offset) {
   return (offset + alignment - 1) / alignment * alignment;
@@ -33,7 +33,7 @@ std::uint64_t bytesOf(const NumberColumn& column) {
   return column.isDouble ? sizeof(double) : sizeof(float);
 }
 
-/// How many numbers the other process needs of a column.
+/// Number of values that the other process needs of a column.
 std::uint64_t countOf(const NumberColumn& column, std::size_t particles) {
   return column.stride == 0 ? std::min<std::size_t>(particles, 1) : particles;
 }

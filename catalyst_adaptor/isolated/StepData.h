@@ -20,7 +20,7 @@ struct StepFields {
   struct NamedParticles {
     std::string name;
     ParticleArray array;
-    glm::dvec3 offset{0.0};  // of the array of cells that they become, in cells
+    glm::dvec3 offset{0.0};  // the offset, in cells, of the array that the particles become
   };
   std::vector<Fields::NamedArray> arrays;
   std::vector<NamedParticles> particles;
@@ -38,7 +38,8 @@ class StepWriter {
 
  private:
   StepFields fields_;
-  std::vector<std::uint64_t> offsets_;  // of each array's blocks that have it, then of particles' columns
+  std::vector<std::uint64_t>
+      offsets_;  // first those of arrays' blocks that have values, then those of particles' columns
   std::vector<std::byte> head_;
   std::uint64_t bytes_ = 0;
 };

@@ -457,7 +457,7 @@ void RunEngine::deliver(const config::RunCamera& camera, bool isForFiles, runlog
   const bool isRoot = state.isRoot();
   Camera from;
   TransferFunction function;
-  std::filesystem::path file;  // of the VDI, if there is one
+  std::filesystem::path file;  // the VDI's path; empty without a VDI
   state.comm.together([&] {
     if (isForFiles && run_.vdi) file = run_.vdi->path(frame.step, camera.name);
     from = run_.cameraAt(camera, frame.step, frame.time, generator.scene().bounds);

@@ -25,7 +25,7 @@
 struct vdi_catalyst : vdi::catalyst::FieldCalls {
   std::unique_ptr<vdi::catalyst::Engine> engine;
   std::unique_ptr<vdi::catalyst::VtkGrid> grid;           // null: no blocks were given
-  std::optional<vdi::catalyst::DeviceDeposits> deposits;  // of particles, once there are some
+  std::optional<vdi::catalyst::DeviceDeposits> deposits;  // present once there are particles
 };
 
 namespace {

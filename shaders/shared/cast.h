@@ -52,7 +52,7 @@ struct CastParams {
   VDI_ADDRESS(Vec4Array) colors;             // [h][w], premultiplied
   VDI_ADDRESS(FloatArray) depths;            // [h][w]
   VDI_ADDRESS(UintPairArray) extremes;       // [h][w]: instead of colors and depths (blending.glsl)
-  VDI_ADDRESS(CellRangeArray) ranges;        // of macrocells (cells.h); for blend modes other than composite
+  VDI_ADDRESS(CellRangeArray) ranges;        // ranges of macrocells (cells.h); for blend modes other than composite
   VDI_ADDRESS(UintArray) status;             // [statusWords]
   VDI_ADDRESS(UintArray) histogram;          // [histogramLevels + 1][2]
   VDI_ADDRESS(UintArray) levels;             // [rows][countedWidth][countedLevelWords]
@@ -88,10 +88,10 @@ struct CastParams {
   float squarePerPosition;
   float stripRows;
   float slabsPerDepth;
-  float lastPosition;  // of the transfer table
+  float lastPosition;  // last position in the transfer table
   // 1: samples are classified by the scalars at their two ends; 0: by the one in their middle
   uint slabs;
-  StoredForm form;  // of segments
+  StoredForm form;  // the form of segments
   // While counting pre-segments: every countedStride-th list of every countedStride-th row, from the band's
   // first row to the row after the band, as [rows][countedWidth].
   uint countedStride;

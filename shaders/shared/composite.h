@@ -47,7 +47,7 @@ struct InterleaveConstants {
   uint rankCount;
   uint rowLength;  // >= listCount
   uint mode;
-  StoredForm form;  // of received and interleaved
+  StoredForm form;  // the form of received and interleaved
 };
 
 struct CompositeParams {
@@ -63,12 +63,12 @@ struct CompositeParams {
   VDI_ADDRESS(UintArray) status;
   VDI_ADDRESS(UintArray) histogram;
   VDI_ADDRESS(UintArray) guard;  // as in CastParams
-  float step;  // of the sample lattice
+  float step;  // step of the sample lattice
   uint budget;
   uint listCount;
   uint maxPerList;
   float level;  // as in CastParams
-  StoredForm form;  // of interleaved and segments
+  StoredForm form;  // the form of interleaved and segments
 };
 
 struct CompositeConstants {

@@ -17,7 +17,7 @@ struct CountsConstants {
   VDI_ADDRESS(UintArray) counts;    // four for each word
   VDI_ADDRESS(UintArray) tooLarge;  // [1]
   uint listCount;
-  uint words;  // of packed
+  uint words;  // number of words in packed
   uint mode;
   uint pad;
 };

@@ -24,11 +24,11 @@ struct ReduceConstants {
   VDI_ADDRESS(UintArray) fittingOffsets;  // [lists + 1]: offsets of these
   // [1]: 0 if the supersegments do not fit, or the pre-segments are missing
   VDI_ADDRESS(UintArray) guard;
-  float step;                             // of the sample lattice
+  float step;                             // step of the sample lattice
   uint listCount;
   uint subgroupCapacity;  // pre-segments of a list that fit a subgroup; 0: no subgroups
   uint pad;
-  StoredForm form;  // of segments
+  StoredForm form;  // the form of segments
 };
 
 VDI_SHARED_END

@@ -34,7 +34,7 @@ VDI_CONST float renderMaxSlope = 8.0F;  // depth per list, in footprints: 83 deg
 VDI_CONST float renderSlopes = 127.0F;  // steps from 0 to renderMaxSlope
 VDI_CONST int renderNoSlope = -128;     // while slopes are looked for
 VDI_CONST int renderOnFace = -128;      // in both slopes of a front or a back: it lies on a face of the box
-VDI_CONST uint renderFaces = 6;         // of a box
+VDI_CONST uint renderFaces = 6;         // number of a box's faces
 VDI_CONST float renderMostDepth = 6.0F;      // optical depth of a supersegment, behind which hardly anything shows
 // Margin of comparisons, so that values that are equal but for rounding give the same decision everywhere.
 VDI_CONST float renderTie = 1.0F / 64.0F;
@@ -130,7 +130,7 @@ struct ExpandConstants {
   // a DepthRange; depths are not negative, so their bits compare as they do
   VDI_ADDRESS(UintArray) depthRange;
   VDI_ADDRESS(Vec4Array) boxFaces;  // [renderFaces], core/BoxFaces.h; for expandModeSlopes and LeaningMasks
-  FaceRounding rounding;            // of lists that end on them
+  FaceRounding rounding;            // for lists that end on a face
   uint mode;
   uint count;        // supersegments in `from`
   uint perspective;  // projection of V_O
@@ -155,12 +155,12 @@ struct RenderParams {
   VDI_ADDRESS(UintArray) waiting;
   float nearest;  // depth range of the VDI, nearest > 0 in perspective
   float farthest;
-  float pixelSize;  // of V_O: view-space size of a pixel at depth 1 (perspective) or anywhere (parallel)
+  float pixelSize;  // view-space size of V_O's pixels, at depth 1 (perspective) or anywhere (parallel)
   uint parallel;    // projection of V_O
   float slopeUnit;  // depth per list at a slope of 1
-  uint width;       // of the picture
+  uint width;       // of the picture, in pixels
   uint height;
-  ivec2 lists;  // of the VDI: width, height
+  ivec2 lists;  // width and height of the VDI, in lists
   float binScale;
   uint hasEnds;
   uint clipPlaneCount;

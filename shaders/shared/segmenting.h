@@ -34,7 +34,7 @@ VDI_CONST uint histogramLevels = 10;
 VDI_CONST float maxDepthCode = 16383.0F;
 VDI_CONST float maxCarriedDepth = 1.0F / 16.0F;
 VDI_CONST float maxDepthChange = 0.25F;  // share of the supersegment's own
-VDI_CONST float thinnestStep = 0.0002F;  // of opticalDepthOfCode
+VDI_CONST float thinnestStep = 0.0002F;  // least step of opticalDepthOfCode
 VDI_CONST float maxColorChange = 3.0F / 255.0F;
 VDI_CONST float unseen = 1e-6F;
 

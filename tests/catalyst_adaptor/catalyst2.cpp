@@ -52,7 +52,7 @@ struct Piece {
   double spacing;
   int level;
 
-  std::vector<double> interleaved;  // of each cell: another value, V
+  std::vector<double> interleaved;  // for each cell another value and V
   std::vector<float> padded;        // points in a halo
   std::array<std::vector<float>, 3> planes;
   std::vector<double> plainCells;

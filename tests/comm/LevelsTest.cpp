@@ -118,7 +118,7 @@ std::vector<Block> cubes(Kind kind, const std::vector<int>& cells) {
   return all;
 }
 
-constexpr double rounding = 1e-9;  // of values of some 100
+constexpr double rounding = 1e-9;  // for values of some 100
 
 }  // namespace
 
@@ -166,7 +166,7 @@ TEST_CASE("spacings with a ratio that is no power of two") {
   const auto means = comm::exchangeGhosts(world, decomposed(cubes(Kind::Cells, cells), world));
   // If cells of two levels do not nest, each side interpolates in the other: not exact to the last bit.
   const bool whole = cells[0] == 3;
-  const double step = 100.0 / cells[0];  // of the field, along a coarse cell's diagonal
+  const double step = 100.0 / cells[0];  // the field's step along a coarse cell's diagonal
   CHECK(worstError(world, means, shrunk(cube(0.0, 3.0), 1.0 / cells[0])) < (whole ? rounding : 0.05 * step));
 }
 

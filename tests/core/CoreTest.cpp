@@ -568,7 +568,7 @@ TEST_CASE("box faces: points are inside exactly where all six say so; an empty b
     });
   };
   for (int i = 0; i < 27; ++i) {
-    const glm::dvec3 share = glm::dvec3(i % 3, i / 3 % 3, i / 9) * 0.7 - 0.2;  // of the box's size
+    const glm::dvec3 share = glm::dvec3(i % 3, i / 3 % 3, i / 9) * 0.7 - 0.2;  // as a share of the box's size
     CHECK(isInside(box, box.lo + share * box.size()) == (i == 13));
     CHECK(isInside(Box{}, box.lo + share * box.size()));
   }

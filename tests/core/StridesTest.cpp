@@ -111,7 +111,7 @@ TEST_CASE("strides that say that values are packed leave a block packed") {
   block.setStrides({8, 32, 97});
   CHECK(!block.isPacked());
   block.dims.z = 1;
-  block.setStrides({8, 32, -7});  // of no consequence
+  block.setStrides({8, 32, -7});  // has no effect
   CHECK(block.isPacked());
   block.data = reinterpret_cast<const std::byte*>(values.data()) + 1;
   block.setStrides({8, 32, 96});

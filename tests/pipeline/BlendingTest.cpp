@@ -204,7 +204,7 @@ TEST_CASE("blending: several surfaces within one sample, the nearest first") {
         Camera::framing({glm::dvec3(0.0), glm::dvec3(7.0, 7.0, 1.0)}, {0.0, 0.0, direction}, {0.0, 1.0, 0.0});
     return generator.renderVolume(camera, function, settings)->rgba[16 * 32 + 16];
   };
-  const glm::vec4 high(0.15F, 0.0F, 0.35F, 0.5F);  // of 0.7
+  const glm::vec4 high(0.15F, 0.0F, 0.35F, 0.5F);  // expected for 0.7
   const glm::vec4 low(0.4F, 0.0F, 0.1F, 0.5F);
   CHECK(glm::length(middleFrom(-1.0) - (high + 0.5F * low)) < 2e-3F);
   CHECK(glm::length(middleFrom(1.0) - (low + 0.5F * high)) < 2e-3F);

@@ -96,7 +96,7 @@ TEST_CASE("an octree of cells with a thin ramp: the picture of the same octree o
   struct Scene {
     const char* name;
     Field field;
-    double worst;       // of 255
+    double worst;       // in 1/255
     double wrongShare;  // share of pixels off by more than 16
   };
   // Cells and points interpolate a curved field at different places; the linear field isolates seams.

@@ -138,7 +138,7 @@ TEST_CASE("a client decodes VDIs while they arrive") {
   decoding.decodes = true;
   Client client(decoding);
   Publisher publisher(server);
-  const auto vdi = std::make_shared<const Vdi>(test::noisyVdi(700, 500, 12));  // of many parts
+  const auto vdi = std::make_shared<const Vdi>(test::noisyVdi(700, 500, 12));  // consists of many parts
   publisher.publish(vdi);
   std::uint32_t level = 0;
   for (const int factor : {9, 5, 3, 1}) {
@@ -339,6 +339,6 @@ TEST_CASE("what can't be served is refused at once") {
   taken.port = server.port();
   CHECK(test::errorOf([&] { Server none(taken); }).code() == ErrorCode::Io);
   ServerOptions elsewhere = options();
-  elsewhere.host = "192.0.2.1";  // of documentation: nobody's
+  elsewhere.host = "192.0.2.1";  // reserved for documentation, so nobody's
   CHECK(test::errorOf([&] { Server none(elsewhere); }).code() == ErrorCode::Io);
 }

@@ -15,7 +15,7 @@ using test::device;
 
 namespace {
 
-/// How many of the part's values differ by more than `tolerance`, of 1000.
+/// Number of the part's values, out of 1000, that differ by more than `tolerance`.
 template <typename T>
 double differing(const std::string& name, const Lattice& lattice, const Part& part, double top,
                  double tolerance) {

@@ -1,4 +1,4 @@
-// How many supersegments each list may hold: the same number, or as many as it needs.
+// The number of supersegments that a list may hold: the same for all lists, or as many as each needs.
 #pragma once
 
 #include <algorithm>

@@ -7,7 +7,8 @@
 namespace vdi::gpu {
 
 struct DeviceLimits {
-  /// Of the largest device-local heap, or `mostBytes` if that is less. Frames are cut into bands accordingly.
+  /// Bytes of the largest device-local heap, or `mostBytes` if that is less. Frames are cut into bands
+  /// accordingly.
   std::uint64_t memoryBytes = 0;
   std::uint64_t mostBytes = 0;  // the most that buffers and images may hold; 0: as the driver allows
   /// The largest reasonable allocation: the larger of maxMemoryAllocationSize and maxBufferSize, at most

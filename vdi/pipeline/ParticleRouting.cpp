@@ -81,7 +81,7 @@ struct ParticleRouting::Cells {
            glm::ivec3(glm::clamp(glm::floor(at + reach), -limit, limit)) + 1};
     stored = all.intersection({glm::ivec3(0), place.cells * parts});
   }
-  /// How many parts the particle meets; a double, because a long kernel's number exceeds 64 bits.
+  /// Number of parts that the particle meets; a double, because a long kernel's number exceeds 64 bits.
   double count() const {
     const glm::dvec3 size(all.size());
     return size.x * size.y * size.z;

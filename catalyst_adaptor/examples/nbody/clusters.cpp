@@ -18,7 +18,7 @@ namespace {
 
 constexpr int stars = 600;
 constexpr int steps = 60;
-constexpr int cells = 32;  // of the lattice, per axis
+constexpr int cells = 32;  // per axis of the lattice
 constexpr double size = 4.0;
 constexpr double spacing = size / cells;
 constexpr double timeStep = 0.02;

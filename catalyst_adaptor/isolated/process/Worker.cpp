@@ -19,7 +19,7 @@ namespace vdi::catalyst {
 
 namespace {
 
-/// How many steps ahead scripts are asked whether they want them.
+/// Number of future steps for which scripts are asked in advance whether they want them.
 constexpr std::int64_t stepsAhead = 1024;
 constexpr std::size_t longestText = 16384;
 
@@ -206,7 +206,7 @@ class Worker {
   MPI_Comm comm_ = MPI_COMM_NULL;
   vdi_catalyst* catalyst_ = nullptr;
   std::array<SharedPages, 2> buffers_;
-  std::optional<std::uint64_t> version_;  // of the blocks that the engine has
+  std::optional<std::uint64_t> version_;  // the version of the engine's blocks
 };
 
 }  // namespace

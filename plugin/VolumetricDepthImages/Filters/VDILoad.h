@@ -37,7 +37,7 @@ struct Load {
   Origin of;
   std::vector<vdi::Block> blocks;
   vdi::ScalarArray array;    // the same on all ranks
-  double voxelVolume = 0.0;  // that of all ranks' smallest voxel; 0 without voxels
+  double voxelVolume = 0.0;  // volume of the smallest voxel on any rank; 0 without voxels
   std::string lack;          // why this rank has no block with the array, if it has blocks
 };
 

@@ -26,7 +26,7 @@ class Volume;
 /// A view's request that the filter hasn't answered yet.
 struct ViewRequest {
   Load load;
-  vdi::Box bounds;  // of all ranks' blocks
+  vdi::Box bounds;  // bounds of all ranks' blocks
 };
 
 /// The state between a filter's updates: the last output, what views wait for, and the preparation of the

@@ -155,7 +155,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   vtkWeakPointer<vtkSMProxy> ChosenMap;     // that map
   std::optional<Subject> Shown;             // the subject of the last map
   std::optional<double> TakenUnitDistance;  // taken from a view
-  std::map<std::string, int> Components;    // of the input's arrays, as the ranks' clients have agreed
+  std::map<std::string, int> Components;  // each input array's components, as the ranks' clients have agreed
 };
 
 #endif

@@ -49,7 +49,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIFileSeriesReader : public vtkFileSer
   std::vector<Header> ReadHeaders();
   void ShareHeaders(std::vector<Header>& headers);
 
-  std::unique_ptr<Known> Headers;  // what earlier reads found in rank 0's files
+  std::unique_ptr<Known> Headers;  // headers that earlier reads found in rank 0's files
   double Viewpoint[12] = {};
   std::string Coloring;
   vtkIdType LastIndex = -1;  // index of the file that was read last

@@ -87,7 +87,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamReader : public vtkImageAlgori
   std::shared_ptr<Link> Connected;           // on rank 0, from the first update on
   std::shared_ptr<const ReceivedVdi> Shown;  // null before the first VDI
   std::string Trouble;                       // reason why there can't be a connection
-  int EarlierArrivals = 0;                   // those of earlier connections and of ends of Pause
+  int EarlierArrivals = 0;                   // arrivals on earlier connections, and ends of Pause
   std::string Connection;
   pv::Failure Failure;
   double Viewpoint[12] = {};
