@@ -363,9 +363,9 @@ class Window:
 
         return wait_for("widget '%s'" % name, look, SECONDS if seconds is None else seconds)
 
-    def has(self, name, role=None):
+    def has(self, name, role=None, seconds=0):
         try:
-            return self.find(name, role, 0) is not None
+            return self.find(name, role, seconds) is not None
         except AssertionError:
             return False
 
@@ -621,9 +621,14 @@ class Window:
             xdotool("windowactivate", "--sync", window, "key", "alt+F4")
         time.sleep(0.5)
 
-    def close(self, seconds=60):
-        """Closes the window with Alt+F4. ParaView must end without an error."""
+    def close(self, seconds=60, answer=None):
+        """Closes the window with Alt+F4, and clicks the button `answer`, if it is given, of the questions that follow.
+        ParaView must end without an error."""
         xdotool("windowactivate", "--sync", self.window, "key", "alt+F4")
+        end = time.monotonic() + seconds
+        while answer and self.process.poll() is None and time.monotonic() < end:
+            if self.has(answer, "push button", 1):
+                self.click(answer, "push button")
         code = self.process.wait(seconds)
         check(code == 0, "ParaView's window is closed: exit code %s" % code)
         check("nullptr" not in self.log_text(), "the log has no message of Qt about a nullptr")
