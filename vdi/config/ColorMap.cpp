@@ -146,7 +146,7 @@ glm::dvec3 between(Space space, const glm::dvec3& first, const glm::dvec3& last,
   return glm::mix(first, last, share);
 }
 
-/// The nodes of a map in that space, converted to a map that is linear in RGB.
+/// The nodes of a map in `space`, converted to a map that is linear in RGB.
 std::vector<ColorNode> straightened(const std::vector<ColorNode>& nodes, Space space) {
   if (space == Space::Rgb) return nodes;
   constexpr std::size_t inAll = 8192;
@@ -181,7 +181,7 @@ Space spaceOf(const JsonValue& preset) {
   space->fail("unknown colour space; use RGB, HSV, Lab, Diverging or Step");
 }
 
-/// Rows of four numbers that follow each other.
+/// The array's numbers in rows of four.
 std::vector<std::array<double, 4>> rowsOf(const JsonValue& value) {
   constexpr std::size_t width = 4;
   const std::vector<JsonValue> items = value.items();
@@ -218,7 +218,7 @@ ColorMap readPreset(const JsonValue& preset) {
   return map;
 }
 
-/// Moves nodes as ParaView does, to the last bit: files are to equal those of a script.
+/// Moves nodes with ParaView's rounding, so that files equal those of a script bit for bit.
 template <typename Node>
 void rescale(std::vector<Node>& nodes, double low, double high, const ScalarRange& range) {
   for (Node& node : nodes) {

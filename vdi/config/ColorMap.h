@@ -11,8 +11,7 @@
 
 namespace vdi::config {
 
-/// A piecewise linear map between nodes in ascending order of x. Colours of a map that isn't linear in RGB
-/// are sampled.
+/// A piecewise linear map between nodes in ascending order of x. A map that isn't linear in RGB is sampled.
 struct ColorMap {
   std::vector<ColorNode> colors;       // at least two, not all at the same x
   std::vector<OpacityNode> opacities;  // at least two, or none if the preset has no opacities
@@ -22,7 +21,7 @@ struct ColorMap {
 inline constexpr JsonLimits presetLimits{
     .bytes = std::size_t{16} << 20, .depth = 16, .values = std::size_t{1} << 20};
 
-/// The preset of that name, or the file's only one if `name` is empty. Throws Error{Format} with the place
+/// The preset with this name, or the file's only one if `name` is empty. Throws Error{Format} with the place
 /// for JSON that isn't a preset, a preset of categories, and a colour space other than RGB, HSV, Lab,
 /// Diverging and Step.
 ColorMap colorMapOf(std::string_view text, const std::string& file, const std::string& name);

@@ -19,7 +19,7 @@ class FilePattern {
   explicit FilePattern(const std::string& text);
 
   bool namesCamera() const { return text_.find(cameraMark) != std::string::npos; }
-  /// `camera` is empty for the run's only camera, whose name the pattern then lacks, too.
+  /// `camera` is empty if the run has a single, unnamed camera; the pattern then has no {camera}.
   std::filesystem::path path(std::int64_t step, const std::string& camera = "") const;
   /// The existing file of this camera with the lowest step. Links, devices and folders with such names count.
   /// Files in an unreadable folder don't.

@@ -28,19 +28,19 @@ namespace {
 
 constexpr std::size_t longestQuote = 60;
 
-/// The part of a text that fits a message.
+/// The text in quotes, cut to fit a message.
 std::string inQuotes(const std::string& text) {
   return "'" + (text.size() <= longestQuote ? text : text.substr(0, longestQuote) + "...") + "'";
 }
 
-/// Throws an error whose message is one line, whatever texts the document has.
+/// Throws an error whose message is one line, even if the document's strings have line ends.
 [[noreturn]] void failAt(const std::string& document, std::size_t line, std::string what) {
   std::replace_if(
       what.begin(), what.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, '?');
   throw Error(ErrorCode::Format, what, fmt::format("{}, line {}", document, line));
 }
 
-/// An iterator over the characters of a text, which tells how many the parser has taken.
+/// An iterator over the characters of a text that records how far the parser has read.
 class Characters {
  public:
   using iterator_category = std::input_iterator_tag;
@@ -87,7 +87,7 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
   }
   bool number_float(number_float_t value, const string_t&) override { return addNumber(value); }
   bool string(string_t& value) override { return add(std::move(value)); }
-  bool binary(binary_t&) override { return false; }  // JSON has none
+  bool binary(binary_t&) override { return false; }  // JSON has no binary values
   bool start_object(std::size_t) override { return open(JsonNode::Members()); }
   bool start_array(std::size_t) override { return open(std::vector<JsonNode>()); }
   bool end_object() override { return close(); }
@@ -167,7 +167,7 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
   std::size_t line_ = 1;
   std::size_t values_ = 0;
   std::vector<JsonNode> open_;
-  std::vector<std::set<std::string>> names_;  // the names so far, of each open object
+  std::vector<std::set<std::string>> names_;  // of each open object, the names so far
   JsonNode root_;
 };
 

@@ -25,7 +25,7 @@ struct RunColors {
   std::string file;                  // a file of ParaView's presets; empty: none
   std::string name;                  // the preset's name in the file; empty: its only preset
   std::optional<ScalarRange> range;  // none: the range of the first frame's values
-  // x are values of the field; empty: the preset's, or a ramp from 0 to 1
+  // by values of the field; empty: the preset's, or a ramp from 0 to 1
   std::vector<OpacityNode> opacities;
   std::optional<double> unitDistance;  // world units; none: unitDistanceOf the first frame
 };
@@ -39,7 +39,7 @@ struct RunOrbit {
 
 /// A run's camera. Without `fixed` and `orbit`, it shows the whole scene along -z, as ParaView's filter does.
 struct RunCamera {
-  std::string name;  // its name in files' names; empty: the run's only camera
+  std::string name;  // as it appears in file names; empty: the run's only camera
   std::optional<Camera> fixed;
   std::optional<RunOrbit> orbit;
 };
@@ -68,7 +68,7 @@ struct RunStream {
   std::string linkFile = "vdi-stream.link";  // empty: the link isn't stored
   std::string certificate;
   std::string key;
-  double megabits = 0.0;                           // rate to each viewer in Mbit a second; 0: no limit
+  double megabits = 0.0;                           // rate to each viewer in Mbit/s; 0: no limit
   bool steer = false;                              // viewers may change the run
   std::string steeringLog = "vdi-steering.jsonl";  // gets a line for each change; empty: none
 };
@@ -80,7 +80,7 @@ struct RunLogFiles {
   bool any() const { return !json.empty() || !text.empty(); }
 };
 
-/// A run whose frames are made in processes of their own, one a rank.
+/// A run whose frames are made in separate processes, one per rank.
 struct RunIsolation {
   bool restart = false;     // processes that have died are started again
   double patience = 300.0;  // seconds that the simulation waits for a frame; 0: it never waits
@@ -96,9 +96,9 @@ struct RunCinema {
 struct Run {
   std::string field;
   std::optional<bool> cells;  // none: as the simulation hands the field over
-  int component = -1;         // of a field of vectors: a component, or magnitude or phase (ComponentValues.h)
+  int component = -1;         // of a vector field: a component, magnitude or phase (ComponentValues.h)
   /// A frame is made when any of these three is due (Schedule), if `when` holds at that step.
-  std::int64_t every = 1;              // due at steps that it divides; 0: none
+  std::int64_t every = 1;              // due at multiples of this step; 0: none
   std::optional<double> everyTime;     // period in the simulation's time
   std::optional<double> everySeconds;  // period in seconds of the wall clock
   std::optional<RunCondition> when;
@@ -143,7 +143,7 @@ std::vector<std::string> presetNames();
 /// Parses a run. Throws Error{Format} with the place of the first mistake. `name` is the document's.
 Run parseRun(std::string_view text, const std::string& name);
 
-/// The fields of each object in such a document, by the object's JSON pointer; "*" matches any index.
+/// The fields of each object in a run's document, by the object's JSON pointer; "*" matches any index.
 const std::map<std::string, std::vector<std::string>>& runFields();
 
 /// A run's text and its origin.

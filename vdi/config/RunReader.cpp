@@ -119,7 +119,8 @@ std::vector<double> elevationsOf(const JsonValue& value) {
   return elevations;
 }
 
-/// All viewpoints of an orbit: one, without a name, or `count` about the axis at each elevation, numbered.
+/// All viewpoints of an orbit: a single unnamed one, or `count` numbered ones about the axis at each
+/// elevation.
 std::vector<RunCamera> camerasOfOrbit(const JsonValue& value) {
   const RunOrbit orbit = orbitOf(value);
   const std::optional<JsonValue> count = value.find("count");

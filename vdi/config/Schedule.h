@@ -9,8 +9,8 @@
 namespace vdi::config {
 
 /// A frame is due
-/// - at steps that `every` divides;
-/// - at the first step at or after each multiple of `everyTime`, a millionth of it early at most, so that a
+/// - at multiples of `every` steps;
+/// - at the first step at or after each multiple of `everyTime`, at most a millionth of it early, so that a
 ///   restart goes on with the same frames;
 /// - at the first step that comes `everySeconds` or more after the last step that was due by this rule.
 /// At the simulation's first step, the last two conditions hold.
@@ -19,14 +19,13 @@ class Schedule {
   explicit Schedule(const Run& run)
       : every_(run.every), everyTime_(run.everyTime), everySeconds_(run.everySeconds) {}
 
-  /// Whether only the first rank can tell whether a frame is due: other ranks may have another clock, and
-  /// another time.
+  /// True if only the first rank can tell whether a frame is due: other ranks' clocks and times may differ.
   bool needsRoot() const { return everyTime_ || everySeconds_; }
   /// `now` is in seconds of a monotonic clock. A time that isn't finite is never due.
   bool isDue(std::int64_t step, double time, double now) const;
   /// Notes that a frame was due at this step, whether or not it has been made.
   void begin(double time, double now);
-  /// Makes frames due only at steps that `steps` divides, from now on.
+  /// From now on, frames are due only at multiples of `steps`.
   void setPeriod(std::int64_t steps);
   /// The number of steps from frame to frame; 1 if steps don't matter.
   std::int64_t period() const { return every_ > 0 ? every_ : 1; }
