@@ -8,7 +8,7 @@
 
 namespace vdi::io {
 
-/// A picture, and from where it shows the volume.
+/// A picture and its viewpoint.
 struct CinemaPicture {
   double time = 0.0;   // of the simulation
   double phi = 0.0;    // degrees: azimuth
@@ -19,8 +19,8 @@ struct CinemaPicture {
 /// data.csv in the database's folder: a line for each picture, with the columns time, phi, theta and FILE.
 class CinemaIndex {
  public:
-  /// `keep`: goes on with the pictures of an index that is there. Throws Error: Io as InputFile, Format for
-  /// an index that has other columns.
+  /// With `keep`, begins with the pictures of an existing index. Throws Error: Io as InputFile, Format for an
+  /// index that has other columns.
   CinemaIndex(std::filesystem::path folder, bool keep);
 
   /// Adds the picture, or replaces the one with the same file. `write` stores the change.

@@ -40,7 +40,7 @@ const char* kindOf(mode_t mode) {
   return S_ISBLK(mode) ? "a block device" : "a device";
 }
 
-/// Makes a closed pipe an error of the write instead of the end of this process.
+/// Blocks SIGPIPE, so that a write to a closed pipe fails instead of ending the process.
 class PipeSignalBlocked {
  public:
   PipeSignalBlocked() {
@@ -74,7 +74,7 @@ void writeTo(int descriptor, std::uint64_t offset, std::span<const std::byte> by
   }
 }
 
-/// The file at the end of a chain of symbolic links; it may not exist.
+/// The file at the end of a chain of symbolic links; it need not exist.
 fs::path followLinks(const fs::path& path) {
   fs::path at = path;
   std::error_code error;
@@ -89,7 +89,7 @@ fs::path followLinks(const fs::path& path) {
   return at;
 }
 
-/// The target of writing to a path.
+/// The target of a write to a path.
 struct Destination {
   fs::path path;                 // as the caller named it
   fs::path file;                 // links followed; equal to path if `through`
@@ -148,7 +148,7 @@ bool giveName(int descriptor, const fs::path& name) {
   return ::linkat(AT_FDCWD, file.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0;
 }
 
-/// For systems where an unnamed file cannot get a name, for example without /proc.
+/// Copies a file on systems where an unnamed one can't get a name, for example without /proc.
 void copyAll(int from, int to, const fs::path& path) {
   std::vector<std::byte> buffer(std::size_t{1} << 20);
   for (std::uint64_t at = 0;;) {
@@ -243,7 +243,7 @@ struct OutputFile::State {
     return made;
   }
 
-  /// Only a renamed file can replace another one, a link cannot; and other processes need a name.
+  /// Other processes open the file by its name, and only a rename, not a link, can replace another file.
   void requireName() {
     if (!name.empty()) return;
     fs::path candidate;

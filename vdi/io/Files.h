@@ -1,4 +1,4 @@
-// Whole files: read with clear errors, and written so that no reader sees half of one.
+// Reads files with clear errors, and writes them so that no reader sees half a file.
 #pragma once
 
 #include <cstddef>

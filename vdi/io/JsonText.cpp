@@ -6,7 +6,7 @@ namespace vdi::io {
 
 namespace {
 
-/// Only for a number or a text, whose destructors allocate nothing.
+/// The JSON of a number or a string, whose destructors allocate nothing.
 std::string dumped(const nlohmann::json& scalar) {
   return scalar.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }

@@ -1,5 +1,5 @@
-// JSON text for files that a run writes. It is put together from texts. nlohmann's objects and lists won't
-// do: their destructors allocate memory, and where that fails the process ends.
+// JSON text for files that a run writes. It is concatenated from strings: the destructors of nlohmann's
+// objects and lists allocate memory, and the process ends if that fails.
 #pragma once
 
 #include <concepts>

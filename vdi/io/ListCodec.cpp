@@ -15,7 +15,7 @@ namespace vdi::io::detail {
 
 namespace {
 
-/// The columns of a chunk; each has one number a supersegment.
+/// The columns of a chunk; each has one number per supersegment.
 constexpr std::size_t columns = 6;
 using Words = std::array<std::uint32_t, columns>;
 
@@ -93,7 +93,7 @@ struct FullCoding {
 /// opacity; their residuals are differences modulo 256.
 struct CompactCoding {
   using Segment = CompactSupersegment;
-  /// Codes of 14 or 12 bits take two bytes, which LZ4 nearly undoes.
+  /// Codes of 14 or 12 bits take two bytes; LZ4 removes nearly all of the padding.
   static constexpr std::array<std::size_t, columns> bytes{2, 2, 2, 1, 1, 1};
 
   struct Fields {

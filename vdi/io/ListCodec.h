@@ -20,7 +20,7 @@ bool canExpandTo(std::uint64_t packedBytes, std::uint64_t bytes);
 /// short.
 std::optional<std::uint64_t> announcedBytes(std::span<const std::byte> packed);
 
-/// Memory for one chunk at a time, which later ones use again.
+/// Memory for one chunk at a time, which later chunks reuse.
 struct PackScratch {
   HostVector<std::byte> plain;
   HostVector<std::byte> packed;

@@ -16,8 +16,8 @@ inline constexpr std::uint64_t maxMetadataBytes = std::uint64_t{1} << 20;
 /// become U+FFFD. `time` and `timeStep` repeat the file's header for readers of the text alone. Throws
 /// Error{Format} for a coloring that validate(Coloring) rejects, and for a text beyond maxMetadataBytes.
 std::string metadataText(const Coloring& coloring, double time, std::uint64_t timeStep);
-/// Reads the coloring from such a text and skips unknown fields. Throws Error{Format} unless the text is such
-/// an object and the coloring is valid.
+/// Reads the coloring from a metadata text and skips unknown fields. Throws Error{Format} unless the text is
+/// a JSON object with a valid coloring.
 Coloring coloringIn(std::string_view text);
 
 }  // namespace vdi::io

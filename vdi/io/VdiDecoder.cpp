@@ -43,7 +43,7 @@ void VdiDecoder::State::add(std::span<const std::byte> bytes) {
     pending.assign(rest.begin(), rest.end());
   } else {
     const std::size_t before = pending.size();
-    pending.resize(before + bytes.size());  // GCC 14 takes insert for an overflow
+    pending.resize(before + bytes.size());  // GCC 14 warns wrongly of an overflow in insert
     std::copy(bytes.begin(), bytes.end(), pending.begin() + static_cast<std::ptrdiff_t>(before));
     pending.erase(pending.begin(), pending.begin() + static_cast<std::ptrdiff_t>(use(pending)));
   }

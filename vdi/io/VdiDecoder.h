@@ -25,7 +25,7 @@ class VdiDecoder {
 
   /// Takes the next bytes, which are not needed afterwards. If they have a fault, finish throws it.
   void add(std::span<const std::byte> bytes);
-  /// Whether a fault was found. Further bytes then change nothing.
+  /// True once a fault was found; further bytes then change nothing.
   bool hasFailed() const;
   /// Ends the decoder. Throws Error{Format} for bytes that io::decode refuses, and for missing ones.
   Vdi finish();

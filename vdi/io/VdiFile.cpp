@@ -77,13 +77,13 @@ ParsedFile parseFile(std::span<const std::byte> bytes) {
 template <typename Segment>
 class Selection {
  public:
-  /// `sources`: lists of the file, in ascending order, between which there may be Thinning::noList.
+  /// `sources`: lists of the file in ascending order, with Thinning::noList in between where none is kept.
   Selection(const std::vector<std::uint32_t>& sources, std::size_t chunks)
       : sources_(sources), wanted_(sources), kept_(chunks) {
     wanted_.erase(std::remove(wanted_.begin(), wanted_.end(), Thinning::noList), wanted_.end());
   }
 
-  /// Call it once for each chunk, whose lists `all` has.
+  /// Call once for each chunk; `all` holds the chunk's lists.
   void take(std::size_t index, const Chunk& chunk, const ListsOf<Segment>& all) {
     Kept& kept = kept_[index];
     auto source = std::lower_bound(wanted_.begin(), wanted_.end(), chunk.firstList);
@@ -258,7 +258,7 @@ std::vector<std::byte> encode(const Vdi& vdi) {
   validateEnds(vdi);
   std::vector<ChunkEntry> table;
   std::vector<std::byte> bytes;
-  // As many as the chunks take before LZ4. Pages that stay empty take no memory.
+  // Room for the chunks as they are before LZ4. Pages that stay empty take no memory.
   bytes.reserve(headBytes(vdi.listCount()) +
                 chunkBytes(vdi.listCount(), vdi.supersegmentCount(), vdi.precision()));
   preferLargePages({bytes.data(), bytes.capacity()});
@@ -316,7 +316,8 @@ void writeVdi(const std::filesystem::path& path, const Vdi& vdi) {
   writeAtomically(path, bytes);
 }
 
-/// Reads each piece while the one before is decoded. Of any other kind of file, reads the first bytes only.
+/// Reads each piece while the previous one is decoded. If the file is of another kind, reads only its first
+/// bytes.
 Vdi readVdi(const std::filesystem::path& path) {
   constexpr std::uint64_t pieceBytes = std::uint64_t{16} << 20;
   const InputFile file(path);

@@ -23,11 +23,11 @@ struct VdiFileInfo {
 /// bytes on every machine (little-endian). Throws Error{Format} for a VDI that decode would refuse.
 std::vector<std::byte> encode(const Vdi& vdi);
 /// Throws Error{Format} for bytes that are truncated, altered, of another version or encoding, or whose
-/// header or chunk table asks for more memory than the chunks can expand to (before that is allocated; they
-/// expand 255 times at most). The result has passed validate(Vdi).
+/// header or chunk table asks for more memory than the chunks can expand to (checked before allocation; they
+/// expand at most 255 times). The result has passed validate(Vdi).
 Vdi decode(std::span<const std::byte> bytes);
 /// Equals thinned(decode(bytes), factor) for each of the factors (vdi/core/Thinning.h), and throws as decode
-/// does, for bytes outside the lists that are kept too. Needs memory for the result only. Each factor is at
+/// does, also for faults outside the lists that are kept. Needs memory for the result only. Each factor is at
 /// least 1.
 std::vector<Vdi> decodeThinned(std::span<const std::byte> bytes, const std::vector<int>& factors);
 /// Reads header, chunk table and metadata only; the lists must be present, but need not be valid.

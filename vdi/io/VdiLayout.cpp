@@ -15,7 +15,7 @@ namespace vdi::io::detail {
 
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the .vdi file is read as it lies");
+static_assert(std::endian::native == std::endian::little, "the .vdi file is read without byte swaps");
 
 constexpr std::array<char, 8> magicText{'V', 'D', 'I', '-', 'F', 'I', 'L', 'E'};
 constexpr std::uint32_t plainVersion = 1;   // neither margin nor metadata

@@ -124,13 +124,13 @@ inline std::uint64_t metadataOffset(const Header& header) {
 
 /// Checks what validate(Vdi) does not: a usable camera and finite numbers.
 void requireSoundHeader(const Vdi& vdi);
-/// The header without the fields that the chunks add.
+/// The header without the fields that depend on the chunks.
 Header headerOf(const Vdi& vdi);
 /// The VDI that the header describes, without lists.
 Vdi vdiOf(const Header& header);
 
 /// The header of a file of `fileBytes` that begins with `start`. Version and encoding are checked before the
-/// checksum, so that the error names a file of a later version as such.
+/// checksum, so that the error for a file of a later version says so.
 Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes);
 /// Parses the bytes from the end of the chunks to the end of the file.
 std::optional<Coloring> parseMetadata(const Header& header, std::span<const std::byte> bytes);
@@ -139,7 +139,7 @@ std::vector<Chunk> parseTable(const Header& header, std::span<const std::byte> b
 /// Checks, before memory is allocated, that the chunk is unaltered and expands to the size in the table.
 void requireSound(const Chunk& chunk, std::span<const std::byte> packed, Precision precision);
 
-/// All chunks of a VDI have one depth code.
+/// Throws unless all chunks have the depth code `shared`.
 void requireCode(const DepthCode& shared, std::span<const DepthCode> chunks);
 
 /// Decodes a chunk into place (see detail::unpackLists, where `ends` and `segments` are explained) and

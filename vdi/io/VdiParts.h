@@ -34,15 +34,15 @@ struct EncodedChunk {
 };
 
 /// Encodes whole chunks, on several threads. `take` gets them in order, on the calling thread; only a few
-/// exist at a time. `lists` are some of the VDI's. Those in [first, last) are encoded: they are a multiple of
-/// listsPerChunk, or end where the VDI does. `firstList` is the VDI's number of list `first`, a multiple of
-/// listsPerChunk. `code` belongs to compact lists. Throws Error{Format} for lists that decode would refuse,
-/// Error{Io} for a chunk beyond 2 GiB, and any exception of `take`.
+/// exist at a time. `lists` are some of the VDI's. Those in [first, last) are encoded: a multiple of
+/// listsPerChunk, or all up to the VDI's last. `firstList` is the index in the VDI of list `first`, a
+/// multiple of listsPerChunk. `code` belongs to compact lists. Throws Error{Format} for lists that decode
+/// would refuse, Error{Io} for a chunk beyond 2 GiB, and any exception of `take`.
 template <typename Segment>
 void encodeChunks(const ListsOf<Segment>& lists, std::size_t first, std::size_t last, std::uint64_t firstList,
                   std::uint32_t budget, const DepthCode& code, const std::function<void(EncodedChunk)>& take);
 
-/// Number of bytes before the first chunk, in a file of that many lists.
+/// The number of bytes before the first chunk in a file of `lists` lists.
 std::uint64_t headBytes(std::uint64_t lists);
 /// The bytes before the first chunk. Uses only the precision of the lists of `vdi`. `table` has all chunks.
 /// Throws Error{Format} for a VDI that decode would refuse.
