@@ -1,5 +1,5 @@
 // Python module pv_vdi._core: .vdi files as NumPy arrays, and pictures of them. pv_vdi/__init__.py re-exports
-// it and says what the classes are for.
+// it and documents the classes.
 #include <pybind11/numpy.h>
 #include <pybind11/operators.h>
 #include <pybind11/pybind11.h>
@@ -48,7 +48,7 @@ py::array viewOf(const T* data, std::vector<py::ssize_t> shape, const py::object
   return array;
 }
 
-/// An array that owns what it shows.
+/// An array that owns its values.
 template <typename T>
 py::array own(vdi::HostVector<T> values, std::vector<py::ssize_t> shape) {
   auto kept = std::make_unique<vdi::HostVector<T>>(std::move(values));

@@ -17,7 +17,7 @@ __all__ = ["Camera", "Error", "Vdi", "read"]
 
 
 class Vdi:
-    """A VDI as it lies in its file. It doesn't change; its arrays are read only.
+    """A VDI, as stored in a file. It doesn't change; its arrays are read-only.
 
     List (x, y), row 0 at the bottom, has the index i = y * width + x and holds the supersegments
     segments[offsets[i]:offsets[i + 1]], front to back.
@@ -30,7 +30,7 @@ class Vdi:
 
     @property
     def camera(self):
-        """The viewpoint that it was made from, V_O."""
+        """The viewpoint at which the VDI was made, V_O."""
         return self._lists.camera
 
     @property
@@ -64,7 +64,7 @@ class Vdi:
 
     @property
     def time(self):
-        """The simulation's time; 0 where it is unknown."""
+        """The simulation's time; 0 if it is unknown."""
         return self._lists.time
 
     @property
@@ -78,7 +78,7 @@ class Vdi:
 
     @property
     def metadata(self):
-        """The meaning of the colours, as a dict (docs/format.md has the fields); None where the file doesn't have it."""
+        """The meaning of the colours, as a dict (docs/format.md has the fields); None if the file lacks it."""
         text = self._lists.metadata_text
         return None if text is None else json.loads(text)
 
@@ -90,7 +90,7 @@ class Vdi:
     @property
     def segments(self):
         """A structured array with the float32 fields front, back (view-space depths of V_O, world units), red, green, blue
-        (premultiplied, accumulated over the interval) and opacity. A copy where the precision is compact, else a view."""
+        (premultiplied, accumulated over the interval) and opacity. A copy if the precision is compact, else a view."""
         if self._segments is None:
             segments = self._lists.segments()
             segments.flags.writeable = False
@@ -101,10 +101,10 @@ class Vdi:
         """The picture from a camera, by default V_O, of (width, height) pixels, by default those of V_O's picture.
 
         Returns colours, float32 [height][width][4], premultiplied RGBA, and depths, float32 [height][width], view-space,
-        infinity where nothing is. Row 0 is the top row, as in image files. `reconstruction` is "sheared", "smooth" or
-        "constant". Renders on the device that VDI_DEVICE names, or the best one. Threads may call it side by side; they
-        take turns.
-        Raises Error for a camera that can't be used and where no device can.
+        infinity where the picture is empty. Row 0 is the top row, as in image files. `reconstruction` is "sheared", "smooth" or
+        "constant". Renders on the device that VDI_DEVICE names, or the best one. Threads may call it at the same time;
+        they take turns.
+        Raises Error for an unusable camera, and if no device is usable.
         """
         if self._renderer is None:
             self._renderer = Renderer(self._lists)
@@ -112,7 +112,7 @@ class Vdi:
         return colors[::-1], depths[::-1]
 
     def write(self, path):
-        """Writes a .vdi file; a file that is there is replaced at once, or stays where writing fails."""
+        """Writes a .vdi file. An existing file is replaced at once, or stays if writing fails."""
         self._lists.write(path)
 
     def __repr__(self):
@@ -120,5 +120,5 @@ class Vdi:
 
 
 def read(path):
-    """The VDI in a .vdi file. Raises Error, which names the file, where there is none or it isn't sound."""
+    """Reads a .vdi file. Raises Error, which names the file, if the file is missing or damaged."""
     return Vdi(_read_lists(path))

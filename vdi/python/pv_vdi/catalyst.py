@@ -1,4 +1,4 @@
-"""Makes VDIs of a simulation's NumPy arrays while it runs, by scripts in ParaView's in situ engine or by a JSON text.
+"""Makes VDIs of a running simulation's NumPy arrays, by scripts in ParaView's in situ engine or by a JSON text.
 
     from mpi4py import MPI
     from pv_vdi.catalyst import Block, Catalyst
@@ -45,7 +45,7 @@ class CatalystError(RuntimeError):
 
 @dataclasses.dataclass
 class Block:
-    """One block of a uniform lattice; each field has x, y and z. `cells` counts ghost cells too, `origin` is the lower corner
+    """One block of a uniform lattice; each field has x, y and z. `cells` counts ghost cells too; `origin` is the lower corner
     of the first cell, ghost or not."""
 
     cells: tuple
@@ -88,7 +88,7 @@ def _columns(positions):
 
 
 def _numbers(what, given, count):
-    """The array of one number for each particle, and its stride; 0 for one number for all."""
+    """The array of the particles' numbers, and its stride, which is 0 for one number for all."""
     array = np.asarray(given)
     if array.ndim > 1 or (array.ndim == 1 and len(array) != count):
         raise ValueError("%s are %s, for %d particles" % (what, array.shape, count))
@@ -99,7 +99,7 @@ def _numbers(what, given, count):
 
 def _float_type(what, dtype):
     if dtype not in (np.dtype("float32"), np.dtype("float64")):
-        raise ValueError("%s are %s; they may be float32 or float64" % (what, dtype))
+        raise ValueError("%s are %s; they must be float32 or float64" % (what, dtype))
     return _TYPES[dtype]
 
 
@@ -153,7 +153,7 @@ def _as_pairs(array):
 
 @contextlib.contextmanager
 def _or_refused(call, *arguments):
-    """If the block raises, makes a call whose arguments fail on all ranks, because the others wait in a call of that name."""
+    """If the block raises, makes the call with arguments that fail on all ranks, because other ranks wait in it."""
     try:
         yield
     except Exception:
@@ -162,8 +162,8 @@ def _or_refused(call, *arguments):
 
 
 class Catalyst:
-    """The engine, with its scripts or what `json` asks for. One with scripts can be made in a process, and one at a time with
-    json; it ends with close() or its `with`."""
+    """The engine, driven by scripts or by `json`. A process can make one with scripts in all, and one at a time with json.
+    close() or the end of its `with` ends it."""
 
     def __init__(self, communicator, scripts=None, json=None):
         """`communicator`: mpi4py's, or None for a simulation without MPI. Either `scripts`, paths of Catalyst scripts, or
@@ -176,7 +176,7 @@ class Catalyst:
         self._library = _load()
         self._handle = ctypes.c_void_p()
         self._blocks = []
-        self._kept = {}  # arrays that the engine points to, by association and name, as it has them itself
+        self._kept = {}  # arrays that the engine points to, by association and name
         if json is not None:
             text = json_module.dumps(json) if isinstance(json, dict) else json
             self._check(self._library.vdi_catalyst_initialize_json(
@@ -187,7 +187,7 @@ class Catalyst:
             communicator.py2f(), len(paths), (ctypes.c_char_p * len(paths))(*paths), ctypes.byref(self._handle)))
 
     def set_blocks(self, blocks):
-        """This rank's blocks, none included; forgets all arrays."""
+        """Sets this rank's blocks, of which there may be none; forgets all arrays."""
         with _or_refused(self._library.vdi_catalyst_set_blocks, self._handle, -1, None):
             blocks = list(blocks)
             made = (_Block * max(len(blocks), 1))(
@@ -200,11 +200,11 @@ class Catalyst:
     def set_array(self, name, arrays, points=False, offset=None):
         """The values of one named array: arrays[i] belongs to block i, and is None if the block lacks it. It is [z][y][x], or
         [z][y][x][component] for vectors, of which a run shows the magnitude unless told otherwise. Complex numbers are vectors
-        of two. Values are of cells, or of points, of which a block has one more per axis. On staggered grids they lie `offset`
-        cells (x, y, z; -0.5 to 0.5) beside these.
+        of two. Values are of cells, or of points, of which a block has one more per axis. On staggered grids the values lie
+        `offset` cells (x, y, z; -0.5 to 0.5) beside these.
 
-        Arrays are kept alive: change them in place between steps, or set others. They are used where they are, whatever their
-        strides: slices, transposed ones, one field of several. Raises ValueError for a shape that the block doesn't have and
+        Arrays are kept alive: change them in place between steps, or set others. They are used in place, whatever their strides:
+        slices, transposed arrays, one field of several. Raises ValueError for a shape that the block doesn't have and
         for a type that the engine doesn't know; ranks without such a fault raise CatalystError then."""
         association = _POINTS if points else _CELLS
         with _or_refused(self._library.vdi_catalyst_set_array_strided, self._handle, b"refused", -1, association, 1, None,
@@ -227,7 +227,7 @@ class Catalyst:
         present = [view for view in views if view is not None]
         types = {view.dtype for view in present} or {np.dtype("float64")}
         if len(types) > 1 or not types <= set(_TYPES):
-            raise ValueError("the values of '%s' are %s; they may be all of %s" % (
+            raise ValueError("the values of '%s' are %s; all must be of one of %s" % (
                 name, " and ".join(sorted(map(str, types))), ", ".join(map(str, _TYPES))))
         components = {view.shape[3] if view.ndim == 4 else 1 for view in present} or {1}
         for view, block in zip(views, self._blocks):
@@ -241,12 +241,12 @@ class Catalyst:
         return _TYPES[types.pop()], components.pop(), pointers, strides
 
     def set_particles(self, name, positions, weights=None, lengths=None, density=False):
-        """Makes an array of cells of this rank's particles, which may lie in blocks of any rank: their weight in each cell, or
-        with `density` that divided by the cell's volume. `positions` is [particle][3], or three arrays x, y and z. `weights`
+        """Makes a cell array of this rank's particles, which may lie in blocks of any rank: the particles' weight in each
+        cell, with `density` divided by the cell's volume. `positions` is [particle][3], or three arrays x, y and z. `weights`
         (1 unless given) and smoothing lengths `lengths` (cloud in cell unless given) are an array each, or a number for all.
         vdi_catalyst.h has the rules.
 
-        Arrays are kept alive and used where they are: change them in place between steps, or set others when their number
+        Arrays are kept alive and used in place: change them in place between steps, or set others when their number
         changes. Raises ValueError for shapes that don't fit and for types other than float32 and float64; ranks without such
         a fault raise CatalystError then."""
         with _or_refused(self._library.vdi_catalyst_set_particles, self._handle, b"refused", None):
@@ -255,20 +255,20 @@ class Catalyst:
         self._kept[_CELLS, name] = kept  # an array of cells, as far as the engine is concerned
 
     def wants(self, step, time=0.0):
-        """Whether this step makes anything, the same on all ranks; if not, there is no need to call execute."""
+        """True if this step makes anything, the same on all ranks; if not, there is no need to call execute."""
         return self._library.vdi_catalyst_wants(self._handle, step, time) != 0
 
     def execute(self, step, time=0.0):
-        """Makes what the scripts or the JSON ask for, of the blocks as they are now. `step` is the same on all ranks, and
+        """Makes what the scripts or the JSON ask for, from the current values. `step` is the same on all ranks, and
         `time` is finite."""
         self._check(self._library.vdi_catalyst_execute(self._handle, step, time))
 
     def parameter(self, name, value, low, high):
-        """A number from `low` to `high` that viewers may change, where a script or the JSON lets them. Returns the value in
-        force, the same on all ranks: `value`, as the first rank's first call had it, until a viewer sets another. Other ranks
-        may pass any value, and later calls any bounds, too. It takes whole numbers only where all three are of type int. To be
-        called at each step, on all ranks; values change in execute alone. Raises ValueError on all ranks unless the first value
-        lies between finite bounds, and for a name that can't be, another type than before, or a 65th parameter."""
+        """A number from `low` to `high` that viewers may change, if a script or the JSON lets them. Returns the value in force,
+        the same on all ranks: the `value` of the first rank's first call, until a viewer sets another. Other ranks may pass any
+        value, and later calls any bounds, too. The parameter takes only whole numbers if all three are of type int. Call it at
+        each step, on all ranks; values change only in execute. Raises ValueError on all ranks unless the first value lies
+        between finite bounds, and for an invalid name, another type than before, or a 65th parameter."""
         whole = all(isinstance(number, int) for number in (value, low, high))
         ask = self._library.vdi_catalyst_parameter_i64 if whole else self._library.vdi_catalyst_parameter_f64
         in_force = ask(self._handle, name.encode(), value, low, high)
