@@ -133,7 +133,7 @@ def restart():
     records = [json.loads(line) for line in open("run.jsonl")]
     starts = [record for record in records if record["event"] == "start"]
     assert len(starts) == 2 and all(start["isolated"] for start in starts) and records[-1]["isolated"], records
-    assert any("; frames in processes of their own took " in line for line in run.lines), run.lines
+    assert any("; frames in separate processes took " in line for line in run.lines), run.lines
     # At most the frame that was being made and the one after it are lost.
     assert len(made()) >= 6 and made()[-1] == "vdi_000007.vdi", made()
 

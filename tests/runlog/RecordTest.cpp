@@ -122,5 +122,5 @@ TEST_CASE("lines to read") {
   CHECK_THAT(textLine(summary), test::ContainsSubstring("; the simulation waited 1.00 s of 4.00 s (25.0 %)"));
   summary.isIsolated = true;
   CHECK_THAT(textLine(summary),
-             test::ContainsSubstring("; frames in processes of their own took 1.00 s of 4.00 s (25.0 %)"));
+             test::ContainsSubstring("; frames in separate processes took 1.00 s of 4.00 s (25.0 %)"));
 }

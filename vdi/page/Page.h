@@ -12,7 +12,7 @@ namespace vdi::page {
 
 /// A frame of the page.
 struct PageFrame {
-  std::string name;                              // that the page shows; UTF-8
+  std::string name;                              // shown by the page; UTF-8
   std::function<std::vector<std::byte>()> file;  // gives the bytes of a .vdi file; called once
 };
 
@@ -28,7 +28,8 @@ void writePage(const std::filesystem::path& path, const std::string& title,
                std::span<const PageFrame> frames);
 
 /// The page without frames, UTF-8. From a server, with #token=… in its link, it shows that server's stream;
-/// else a user opens or drops files. It may connect to where it came from, which a page with frames may not.
+/// else a user opens or drops files. It may connect to its own origin; a page with frames may connect to
+/// nothing.
 std::string emptyPage(const std::string& title);
 
 }  // namespace vdi::page

@@ -55,7 +55,7 @@ void appendLiterals(std::vector<std::byte>& to, std::span<const std::byte> plain
 }  // namespace
 
 std::vector<std::byte> withPlainChunks(std::span<const std::byte> file) {
-  static_cast<void>(io::decode(file));  // from here on all lengths hold
+  static_cast<void>(io::decode(file));  // from here on, all lengths are valid
   const auto precision = static_cast<Precision>(numberAt<std::uint32_t>(file, encodingAt));
   const std::uint64_t lists =
       std::uint64_t{numberAt<std::uint32_t>(file, widthAt)} * numberAt<std::uint32_t>(file, heightAt);

@@ -1,4 +1,4 @@
-// A .vdi file for a packer that does better than LZ4.
+// Prepares a .vdi file for a compressor that does better than LZ4.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +7,8 @@
 
 namespace vdi::page {
 
-/// The same VDI as a .vdi file whose chunks aren't compressed: LZ4 blocks of literals alone, with checksums
-/// of their own. This file is larger than the original, but smaller after deflate than the original would be.
+/// The same VDI as a .vdi file whose chunks aren't compressed: LZ4 blocks of literals alone, with new
+/// checksums. This file is larger than the original, but smaller after deflate than the original would be.
 /// Throws Error{Format} for what io::decode refuses.
 std::vector<std::byte> withPlainChunks(std::span<const std::byte> file);
 

@@ -22,12 +22,12 @@ constexpr double left = 70.0;
 constexpr double right = 980.0;
 constexpr std::size_t mostHints = 2000;  // more would make a large file slow to show
 
-/// Told apart by colour-blind eyes, too (Okabe and Ito).
+/// Colours that colour-blind readers can tell apart, too (Okabe and Ito).
 constexpr std::array<const char*, 8> palette{"#999999", "#0072B2", "#E69F00", "#56B4E9",
                                              "#009E73", "#CC79A7", "#F0E442", "#D55E00"};
 constexpr const char* failure = "#c00000";
 
-/// A distance between ticks that people read easily, for about `count` of them up to `most`.
+/// A round distance between ticks, for about `count` ticks up to `most`.
 double tickDistance(double most, int count) {
   const double raw = most / count;
   const double power = std::pow(10.0, std::floor(std::log10(raw)));

@@ -35,7 +35,7 @@ constexpr std::array<Stage, 6> stages{{{"upload", &RankReport::uploadSeconds},
                                        {"gather", &RankReport::gatherSeconds},
                                        {"output", &RankReport::outputSeconds}}};
 
-/// Microseconds are as fine as anybody reads.
+/// Rounds to microseconds.
 double rounded(double milliseconds) {
   return std::round(milliseconds * millisecondsPerSecond) / millisecondsPerSecond;
 }
@@ -132,7 +132,7 @@ std::string stagesText(const std::vector<StageTime>& times) {
   return text;
 }
 
-/// A message may have several lines.
+/// Replaces the line ends of a message with spaces.
 std::string onOneLine(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](char c) { return static_cast<unsigned char>(c) < ' '; }, ' ');
@@ -272,7 +272,7 @@ std::string textLine(const RunSummary& summary) {
   line +=
       fmt::format("{} dropped by the stream; {} written", summary.dropped, mebibytes(summary.bytesWritten));
   line += fmt::format("; {} {:.2f} s of {:.2f} s ({:.1f} %)",
-                      summary.isIsolated ? "frames in processes of their own took" : "the simulation waited",
+                      summary.isIsolated ? "frames in separate processes took" : "the simulation waited",
                       summary.waitedSeconds, summary.seconds, share);
   if (all > 0) {
     line += fmt::format(", {:.1f} ms a frame, {:.1f} ms at most",
@@ -294,7 +294,7 @@ RunRecords parseRecords(std::string_view lines) {
     try {
       taken = take(Json::parse(line), records);
     } catch (const Json::exception&) {
-      taken = false;  // it is counted, and told by the caller
+      taken = false;  // counted below, and reported by the caller
     }
     if (!taken) ++records.skipped;
   }

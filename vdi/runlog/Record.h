@@ -1,4 +1,4 @@
-// The log of a run in situ: one record a frame, as a line of text and as a line of JSON.
+// The log of a run in situ: one record per frame, as a line of text and as a line of JSON.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace vdi::runlog {
 
 constexpr double bytesPerMebibyte = 1048576.0;
 
-/// Wall-clock milliseconds of a stage, waiting for other ranks within it included.
+/// Wall-clock milliseconds of a stage, including waits for other ranks.
 struct StageTime {
   std::string name;
   double slowest = 0.0;  // of the ranks
@@ -22,7 +22,7 @@ struct StageTime {
   bool operator==(const StageTime&) const = default;
 };
 
-/// The slowest and the mean of the ranks' milliseconds, of which there is at least one.
+/// The slowest and the mean of the ranks' milliseconds; requires at least one rank.
 StageTime stageOf(std::string name, std::span<const double> milliseconds);
 
 /// upload, generate, distribute, composite, gather and output, in this order; `reports` are all ranks'.
@@ -41,19 +41,19 @@ struct FrameRecord {
   std::int64_t step = 0;
   double time = 0.0;
   std::string camera;               // empty: the run's only one
-  double milliseconds = 0.0;        // the frame took this long, as the first rank saw it
+  double milliseconds = 0.0;        // duration of the frame on the first rank
   std::vector<StageTime> stages;    // of a failed frame: none
   std::uint64_t bytesWritten = 0;   // into files
   std::uint64_t bytesSent = 0;      // between ranks, all of them together
-  std::uint64_t deviceBytes = 0;    // device memory held, the most of a rank
-  std::uint64_t hostPeakBytes = 0;  // the most of a rank's process so far
+  std::uint64_t deviceBytes = 0;    // device memory held, maximum over ranks
+  std::uint64_t hostPeakBytes = 0;  // of a process so far, maximum over ranks
   std::uint64_t dropped = 0;        // frames that the stream has left out so far
   std::vector<std::string> files;   // as the run names them
   std::string error;                // of a failed frame; empty: it was made
   bool operator==(const FrameRecord&) const = default;
 };
 
-/// Fills what `reports` of all ranks tell: stages, bytes and memory.
+/// Fills in stages, bytes and memory from all ranks' reports.
 void setReports(FrameRecord& record, std::span<const RankReport> reports);
 
 /// A frame that was due and has not been made.
@@ -72,7 +72,7 @@ struct RunSummary {
   std::uint64_t dropped = 0;  // by the stream
   std::uint64_t bytesWritten = 0;
   double seconds = 0.0;              // of the run, from its start
-  double waitedSeconds = 0.0;        // of these, those that frames took, failed ones included
+  double waitedSeconds = 0.0;        // of these, spent on frames, failed ones included
   double longestMilliseconds = 0.0;  // of a frame
   std::vector<StageTime> stages;     // sums over frames
   bool isIsolated = false;           // as in RunStart; if not, the simulation waited for the frames
@@ -97,7 +97,7 @@ struct RunRecords {
   std::vector<FrameRecord> frames;
   std::vector<LeftOut> leftOut;
   std::vector<RunSummary> summaries;
-  std::size_t skipped = 0;  // lines that aren't records, such as one that a full disk has cut
+  std::size_t skipped = 0;  // lines that aren't records, such as one cut short by a full disk
 };
 RunRecords parseRecords(std::string_view lines);
 /// Throws Error: Io as io::InputFile, Format if no line of the file is a record or the file has more than

@@ -32,7 +32,7 @@ class RunLog::Appended {
     std::error_code error;
     if (path_.has_parent_path()) std::filesystem::create_directories(path_.parent_path(), error);
     if (error) throw Error(ErrorCode::Io, "can't make the log's folder: " + error.message(), path_.string());
-    // Non-blocking, for a pipe without a reader would be waited for.
+    // Non-blocking, so that opening a file that isn't regular doesn't wait.
     constexpr mode_t readable = 0666;
     descriptor_ = Descriptor(
         ::open(path_.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK, readable));
@@ -69,7 +69,7 @@ class RunLog::Appended {
 RunLog::RunLog(const LogFiles& files, const RunStart& start, Before before) {
   if (files.json) json_ = std::make_unique<Appended>(*files.json);
   if (files.text) text_ = std::make_unique<Appended>(*files.text);
-  // Both files are open: neither loses its content because of the other.
+  // Empties the files only once both are open, so that a failure to open one spares the other.
   for (Appended* file : {json_.get(), text_.get()}) {
     if (file != nullptr && before == Before::Goes) file->empty();
   }

@@ -1,4 +1,4 @@
-// Writes a run's log while it goes on.
+// Writes a run's log while the run goes on.
 #pragma once
 
 #include <chrono>
@@ -10,7 +10,7 @@
 
 namespace vdi::runlog {
 
-/// At least one of the two.
+/// The log's files, of which at least one is set.
 struct LogFiles {
   std::optional<std::filesystem::path> json;
   std::optional<std::filesystem::path> text;
