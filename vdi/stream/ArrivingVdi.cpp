@@ -10,7 +10,7 @@ ArrivingVdi::ArrivingVdi(std::uint64_t fileBytes) : decoder_(std::make_shared<io
 void ArrivingVdi::add(std::span<const std::byte> bytes) {
   waiting_.insert(waiting_.end(), bytes.begin(), bytes.end());
   if (job_.valid()) {
-    // A thread that couldn't be started is deferred; then finish decodes.
+    // If no thread could be started, the job is deferred, and finish runs it.
     if (job_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
     job_.get();
   }

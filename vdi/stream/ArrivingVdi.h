@@ -1,4 +1,4 @@
-// A VDI that is decoded beside the thread that receives its bytes.
+// A VDI that another thread decodes while its bytes arrive.
 #pragma once
 
 #include <cstddef>
@@ -19,13 +19,13 @@ class ArrivingVdi {
  public:
   /// For a .vdi file of `fileBytes` bytes.
   explicit ArrivingVdi(std::uint64_t fileBytes);
-  /// The next bytes, of which a copy is kept.
+  /// Takes the next bytes, of which it keeps a copy.
   void add(std::span<const std::byte> bytes);
   /// Waits for the rest of the decoding. Throws as io::VdiDecoder::finish. Call it once.
   Vdi finish();
 
  private:
-  std::shared_ptr<io::VdiDecoder> decoder_;  // the job's, too
+  std::shared_ptr<io::VdiDecoder> decoder_;  // shared with the job
   std::vector<std::byte> waiting_;
   std::future<void> job_;
 };

@@ -1,4 +1,4 @@
-// Puts the messages of a server together to whole levels. No network.
+// Assembles whole levels from a server's messages. Uses no network.
 #pragma once
 
 #include <cstddef>
@@ -14,21 +14,20 @@
 
 namespace vdi::stream {
 
-/// A whole level: a .vdi file that hasn't been looked at yet, or its VDI.
+/// A whole level: a .vdi file that hasn't been checked yet, or its VDI.
 struct Received {
   Level level;
   std::vector<std::byte> file;  // empty if `vdi` is there instead
   std::optional<ArrivingVdi> vdi;
-  std::string
-      missing;  // why there is no file of a frame that was asked for; of `level`, only `frame` is set then
-  std::string session;  // the session that the frame is from; Client sets it
+  std::string missing;  // why a requested frame has no file; only level.frame is set then
+  std::string session;  // the frame's session, set by Client
 
   /// The level's VDI; call it once. Throws Error{Format} for a damaged one.
   Vdi decode();
 };
 
-/// Assembles the messages of one connection, in order. It takes memory for bytes that have come, not for
-/// those that are announced.
+/// Assembles the messages of one connection, in order. Memory follows the bytes that have come, not those
+/// that are announced.
 class Assembly {
  public:
   enum class Gives { Files, Vdis };
@@ -39,13 +38,13 @@ class Assembly {
   /// Adds a binary message, and returns the level that it completes. Throws Error{Format} unless it is the
   /// next part of the level that was begun.
   std::optional<Received> add(std::span<const std::byte> message);
-  /// Acknowledges what has come of the level under way.
+  /// The acknowledgement of the bytes so far of the level under way.
   std::optional<Ack> progress() const;
 
  private:
   Gives gives_;
   std::optional<Level> level_;
-  std::uint64_t bytes_ = 0;  // of it that have come
+  std::uint64_t bytes_ = 0;  // of the level that have come
   std::vector<std::byte> file_;
   std::optional<ArrivingVdi> vdi_;
 };

@@ -183,13 +183,13 @@ class Client::Impl {
     if (line_ && isWelcome_) line_->send(textOf(message));
   }
 
-  /// Asks for the wanted frame if the series has it, and has it from its entry `from` on. A server that was
-  /// started again may still be listing its files, and closes the connection to viewers that ask for others.
+  /// Asks for the wanted frame if it is an entry of the series, at index `from` or later. A restarted server
+  /// may still be listing its files, and disconnects viewers that ask for frames that it hasn't listed.
   void askForShown(std::size_t from) {
     if (shown_ && *shown_ >= from && *shown_ < series_.size()) send(Show{*shown_});
   }
 
-  /// Runs `work` on what the server sent. An error in it makes this client fail.
+  /// Runs `work` on what the server sent. An error in `work` makes this client fail.
   template <typename Work>
   void guarded(Work work) {
     try {
@@ -319,12 +319,12 @@ class Client::Impl {
 
   const ClientOptions options_;
 
-  mutable std::mutex mutex_;  // for the next six
+  mutable std::mutex mutex_;  // guards the next six members
   std::condition_variable changed_;
   std::deque<Whole> wholes_;
-  std::uint64_t waitingBytes_ = 0;  // in them
+  std::uint64_t waitingBytes_ = 0;  // of wholes_
   Standing standing_;
-  Series series_;  // the thread alone changes it
+  Series series_;  // only the thread changes it
   std::optional<Error> failure_;
 
   // The rest belongs to the thread.
@@ -340,7 +340,7 @@ class Client::Impl {
   std::string session_;
   std::optional<std::uint32_t> have_;
   std::optional<std::uint32_t> shown_;
-  std::string cause_;  // that the server gave
+  std::string cause_;  // given by the server
   std::string said_;
   std::chrono::milliseconds wait_ = firstPause;
   bool isPaused_ = false;

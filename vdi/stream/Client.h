@@ -1,4 +1,4 @@
-// A viewer that isn't a browser: gets levels from a server.
+// A viewer outside a browser, which gets levels from a server.
 #pragma once
 
 #include <chrono>
@@ -17,10 +17,10 @@ namespace vdi::stream {
 
 struct ClientOptions {
   Url url;  // with a token
-  /// In place of the link: `sh -c` runs this and finds a server at its standard input and output, as
-  /// "ssh host vdi serve --stdio folder" does. Each connection runs it anew.
+  /// A command for `sh -c`, used instead of the link. It must connect its standard input and output to a
+  /// server, as "ssh host vdi serve --stdio folder" does. Each connection runs it anew.
   std::string command;
-  /// PEM: certificates to trust beside the system's.
+  /// PEM file of certificates to trust besides the system's.
   std::filesystem::path authority;
   /// A level of more bytes ends the connection.
   std::uint64_t mostLevelBytes = std::uint64_t{4} << 30;
@@ -34,24 +34,25 @@ struct ClientOptions {
 /// level counts as received once next() returns it, so a slow caller gets fewer frames rather than old ones.
 class Client {
  public:
-  /// Throws Error{Io} for an authority that can't be read. Whether the server can be reached shows later.
+  /// Throws Error{Io} for an authority that can't be read. standing() tells later whether the server can be
+  /// reached.
   explicit Client(ClientOptions options);
-  /// Ends the connection, within two seconds, or four where a command runs.
+  /// Ends the connection, within two seconds, or four if a command runs.
   ~Client();
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
 
   /// Returns the next whole level, or nullopt after `timeout`. Throws Error, now and in each later call, once
   /// trying again is of no use: InvalidArgument for a wrong token, Format for a server of another version or
-  /// a peer that is no such server, Io for a certificate that isn't trusted.
+  /// a peer that isn't a server of VDIs, Io for a certificate that isn't trusted.
   std::optional<Received> next(std::chrono::milliseconds timeout);
 
   struct Standing {
-    bool isConnected = false;                     // and welcome
+    bool isConnected = false;                     // and welcomed by the server
     std::string session;                          // of the last connection
     State state;                                  // what the server said last
-    bool hasState = false;                        // on the last connection, and after its series
-    bool hasBeenLive = false;                     // in the session; a finished series never is
+    bool hasState = false;                        // the last connection has sent `state`, after its series
+    bool hasBeenLive = false;                     // in the session; false for a finished series
     std::optional<std::size_t> series;            // frames in it
     std::chrono::steady_clock::time_point since;  // of isConnected
     std::string trouble;                          // why there is no connection; empty: none so far
@@ -60,7 +61,7 @@ class Client {
   /// The series of the last connection, from its entry `from` on; empty: there's none, or none so far.
   Series seriesFrom(std::size_t from) const;
 
-  /// Asks for a frame of the series, here and after a reconnect, as soon as the series has it.
+  /// Asks for a frame as soon as the series has it, now and after each reconnect.
   void show(std::uint32_t index);
   void pause();
   /// Asks for the newest frames again.

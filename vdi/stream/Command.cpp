@@ -34,7 +34,7 @@ class Setup {
     ::posix_spawn_file_actions_init(&actions_);
     for (const int standard : {STDIN_FILENO, STDOUT_FILENO})
       ::posix_spawn_file_actions_adddup2(&actions_, socket, standard);
-    // This process's sockets are none of the command's: it would keep a port taken.
+    // The command must not inherit this process's sockets, or it would keep a port taken.
     ::posix_spawn_file_actions_addclosefrom_np(&actions_, STDERR_FILENO + 1);
     ::posix_spawnattr_init(&attributes_);
     sigset_t signals;

@@ -105,7 +105,7 @@ class SocketConnection : public Connection, public std::enable_shared_from_this<
                                     });
   }
 
-  /// After a reply. Closing at once could cost the peer the end of it.
+  /// Ends the connection after a reply. Closing it at once could cost the peer the reply's end.
   void hangUp() {
     auto* const tls = socket_.next_layer().tls();
     if (tls != nullptr) return tls->async_shutdown([self = shared_from_this()](Error) { self->cut(); });
@@ -170,7 +170,7 @@ class SocketConnection : public Connection, public std::enable_shared_from_this<
   void pump() {
     if (hasEnded_) return;
     if (isWriting_) {
-      // A level that doesn't get through is in the way of the reason, too.
+      // A level that can't be sent would block the reason for the disconnection, too.
       if (viewer_->isStalled() && std::holds_alternative<Viewer::Binary>(outgoing_)) end();
       return;
     }

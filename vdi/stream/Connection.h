@@ -1,5 +1,5 @@
-// One connection to the server: HTTP first, a WebSocket if that is asked for. Not part of the library's
-// interface.
+// One connection to the server: HTTP first, then a WebSocket if the peer asks for one. Not part of the
+// library's interface.
 #pragma once
 
 #include <boost/asio/ssl/context.hpp>
@@ -20,20 +20,20 @@ struct Surroundings {
   std::function<void()> leave;
 };
 
-/// It lives as long as something is under way on it.
+/// A connection lives as long as an operation on it is under way.
 class Connection {
  public:
   virtual ~Connection() = default;
   virtual void start() = 0;
-  /// Says goodbye to a viewer; others are cut off.
+  /// Says goodbye to a viewer, and cuts off any other peer.
   virtual void finish() = 0;
-  /// Cuts it off.
+  /// Closes the connection at once.
   virtual void cut() = 0;
-  /// Whether it has shown the token.
+  /// Whether the peer is a viewer that has shown the token.
   virtual bool isWelcome() const = 0;
 };
 
-/// Encrypted, unless `tls` is null.
+/// Makes a connection, encrypted unless `tls` is null.
 std::shared_ptr<Connection> connection(Plain::socket_type socket, boost::asio::ssl::context* tls,
                                        const Surroundings& surroundings);
 

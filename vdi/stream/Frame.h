@@ -21,15 +21,15 @@ struct EncodedLevel {
   int height = 0;
 };
 
-/// All viewers of a frame share it, so that nothing in it ever changes.
+/// All viewers of a frame share it, so nothing in it ever changes.
 struct Frame {
   std::uint32_t id = 0;
   std::uint64_t step = 0;
   double time = 0.0;
   Clock::time_point made;
   std::uint32_t levelCount = 1;
-  /// The encoded levels, the coarsest first. The coarse ones come together, unless another server sends
-  /// them. The last of levelCount is the VDI.
+  /// The encoded levels, the coarsest first. A relay publishes them one by one; otherwise
+  /// the coarse ones come together. The last of levelCount is the VDI.
   std::vector<std::shared_ptr<const EncodedLevel>> levels;
 };
 using FramePtr = std::shared_ptr<const Frame>;
@@ -37,7 +37,7 @@ using FramePtr = std::shared_ptr<const Frame>;
 /// A coarse level of factor f keeps every f-th list of each row and of each column. The factors are odd, so
 /// that the ray of a coarse pixel is one of the VDI's.
 inline constexpr std::array<int, 3> coarseFactors{9, 5, 3};
-/// A level of fewer bytes in memory is the coarsest.
+/// A level that takes fewer bytes in memory than this is the coarsest.
 inline constexpr std::uint64_t smallBytes = std::uint64_t{1} << 20;
 /// The factors of the coarse levels of a VDI that takes `bytes` bytes in memory, the coarsest first.
 std::vector<int> coarseFactorsOf(std::uint64_t bytes);

@@ -5,8 +5,8 @@
 
 namespace vdi::stream {
 
-/// The token in that file, if one is named, or in the environment variable VDI_TOKEN; empty: neither. Throws
-/// Error as tokenIn and requireToken (Token.h).
+/// The token in `file`, or without a file that in the environment variable VDI_TOKEN; empty if neither is
+/// set. Throws Error as tokenIn and requireToken (Token.h).
 std::string givenToken(const std::string& file);
 
 }  // namespace vdi::stream

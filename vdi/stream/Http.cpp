@@ -109,7 +109,7 @@ bool Site::admits(const HttpRequest& request, std::string& cause) const {
     return false;
   }
   const auto found = request.find(http::field::origin);
-  if (found == request.end()) return true;  // no browser
+  if (found == request.end()) return true;  // not a browser
   const std::string_view origin = plain(found->value());
   const std::string host(field(request, http::field::host));
   const bool isOwn = !host.empty() && (origin == "http://" + host || origin == "https://" + host);

@@ -1,4 +1,4 @@
-// Answers plain HTTP requests, and decides which requests may open the stream. No sockets.
+// Answers plain HTTP requests, and decides which requests may open the stream. Uses no sockets.
 #pragma once
 
 #include <boost/beast/http/empty_body.hpp>
@@ -17,12 +17,12 @@ using HttpReply = boost::beast::http::response<boost::beast::http::string_body>;
 
 class Site {
  public:
-  /// `page`: at /. `status`: gives the JSON at /status.
+  /// `page` is served at /. `status` returns the JSON for /status.
   Site(std::string page, const std::string& token, std::vector<std::string> origins,
        std::function<std::string()> status);
 
   HttpReply reply(const HttpRequest& request) const;
-  /// Whether a request for a WebSocket at /stream may have one. Otherwise `cause` says why not.
+  /// Whether a request may open a WebSocket at /stream. If not, sets `cause` to the reason.
   bool admits(const HttpRequest& request, std::string& cause) const;
   /// The reply to a request that isn't admitted.
   static HttpReply refusal(const HttpRequest& request, const std::string& cause);

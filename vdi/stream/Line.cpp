@@ -120,7 +120,7 @@ class SocketLine : public Line, public std::enable_shared_from_this<SocketLine> 
 
   Plain& transport() { return boost::beast::get_lowest_layer(socket_); }
 
-  /// Connects to the host's next address. `last` is the reason why the one before failed.
+  /// Connects to the host's next address. `last` is the reason why the previous one failed.
   void connect(Error last) {
     if (hasEnded_) return;
     if (endpoints_.empty()) return fail("can't connect to " + url_.authority(), last);
@@ -162,7 +162,7 @@ class SocketLine : public Line, public std::enable_shared_from_this<SocketLine> 
     socket_.auto_fragment(false);
     socket_.async_handshake(response_, url_.authority(), "/stream", [self = shared_from_this()](Error error) {
       if (error == websocket::error::upgrade_declined) {
-        // An error of the server's, such as 502 of a proxy, may pass.
+        // A server error, such as a proxy's 502, may be temporary.
         constexpr int serverErrors = 500;
         const int status = static_cast<int>(self->response_.result_int());
         self->end(0, self->name() + " has no VDIs to offer: HTTP status " + std::to_string(status),
@@ -213,7 +213,7 @@ class SocketLine : public Line, public std::enable_shared_from_this<SocketLine> 
       self->isWriting_ = false;
       if (self->hasEnded_) return;
       if (self->isClosing_) return self->closeNow();
-      if (!error) self->write();  // reading says why it failed
+      if (!error) self->write();  // the read under way reports why it failed
     });
   }
 
@@ -270,7 +270,7 @@ std::shared_ptr<Line> line(boost::asio::io_context& context, boost::asio::ssl::c
 std::shared_ptr<Line> commandLine(boost::asio::io_context& context, const std::string& command,
                                   LineEvents events) {
   Url nowhere;
-  nowhere.host = "localhost";  // HTTP wants one
+  nowhere.host = "localhost";  // HTTP requires a host
   auto made = std::make_shared<SocketLine>(context, nullptr, nowhere, std::move(events));
   made->runFirst(command);
   return made;

@@ -171,7 +171,7 @@ Outbox::Next Outbox::next(Clock::time_point now) {
     allowance_ = std::min(allowance_ + earned, burst);
     allowedAt_ = now;
   }
-  // The first level goes on in any case: a slow viewer would never see a whole one otherwise.
+  // A frame's first level goes on in any case. Otherwise a slow viewer would never see a whole frame.
   const bool goesOn = isUnderWay() && (newest_ == current_ || isFirstUnderWay());
   if (cap_ > 0.0 && allowance_ <= 0.0) {
     result.retry = after(now, -allowance_ / cap_ + 1e-4);

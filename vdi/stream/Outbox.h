@@ -1,5 +1,5 @@
 // Decides what one viewer gets next. Newer frames take the place of older ones. A viewer's acknowledgements
-// decide how much may be under way to it, and with which level a frame begins. No network.
+// decide how much may be under way to it, and with which level a frame begins. Uses no network.
 #pragma once
 
 #include <cstdint>
@@ -19,12 +19,12 @@ class Outbox {
   /// `mostBytesPerSecond`: 0 for no limit.
   explicit Outbox(double mostBytesPerSecond) : cap_(mostBytesPerSecond) {}
 
-  /// A frame to show next, or more levels of the one that was offered last. One that was offered before and
-  /// hasn't been begun is dropped.
+  /// Offers a frame to show next, or more levels of the frame that was offered last. Drops an earlier frame
+  /// that hasn't been begun.
   void offer(FramePtr frame, Clock::time_point now);
-  /// The viewer has that frame in full already.
+  /// Notes that the viewer already has all of `frame`.
   void skip(FramePtr frame);
-  /// Until resumed, nothing is begun. A level under way goes on.
+  /// While paused, next() begins no level. A level under way goes on.
   void pause(bool paused) { isPaused_ = paused; }
 
   /// A part of a level; at offset 0 the level begins.
@@ -40,23 +40,23 @@ class Outbox {
   };
   /// Decides what to send now. The returned part counts as sent.
   Next next(Clock::time_point now);
-  /// Notes an acknowledgement. One of what wasn't sent, or was acknowledged before, changes nothing.
+  /// Notes an acknowledgement. Ignores one of bytes that weren't sent, or were acknowledged before.
   void acknowledge(const Ack& ack, Clock::time_point now);
 
   /// Frames of which the viewer got nothing.
   std::uint64_t dropped() const { return dropped_; }
-  /// Bytes a second that the viewer takes, as far as acknowledgements and the limit tell; 0: unknown.
+  /// The bytes per second that the viewer takes, estimated from acknowledgements and the limit; 0: unknown.
   double rate() const;
   /// Bytes sent and not acknowledged.
   std::uint64_t underWay() const { return underWay_; }
   /// Bytes that may be under way.
   std::uint64_t window() const;
 
-  /// Levels that are still to be sent, or may be. Those that have been sent, or won't be, aren't kept.
+  /// The levels that are kept because they are, or may be, still to be sent.
   std::vector<std::shared_ptr<const EncodedLevel>> held() const;
-  /// When the viewer last acknowledged something, or got an offer while nothing was held for it.
+  /// The time when the viewer last acknowledged something, or got an offer while nothing was held for it.
   Clock::time_point movedAt() const { return movedAt_; }
-  /// Keeps nothing any more, and gives nothing out.
+  /// Releases all frames. Afterwards, next() gives nothing.
   void close();
 
  private:
@@ -80,7 +80,7 @@ class Outbox {
   void release();
 
   double cap_;
-  double allowance_ = 0.0;  // bytes that the limit lets go now; may be negative
+  double allowance_ = 0.0;  // bytes that the limit allows now; may be negative
   std::optional<Clock::time_point> allowedAt_;
   bool isPaused_ = false;
   bool isClosed_ = false;

@@ -12,7 +12,7 @@ namespace vdi::stream {
 
 /// The line that precedes the HTTP of docs/live.md, without a line end.
 std::string greeting(const std::string& token);
-/// The token in such a line; nullopt for another line, such as one that a shell writes when it starts.
+/// The token in a greeting; nullopt for another line, such as one that a shell writes when it starts.
 std::optional<std::string> tokenInGreeting(std::string_view line);
 
 /// Writes the greeting with the server's token, then carries one connection of the server until either side

@@ -18,22 +18,23 @@ namespace vdi::stream {
 
 inline constexpr int protocolVersion = 1;
 inline constexpr char subprotocol[] = "pv-vdi.1";
-/// The most that a viewer's message may take.
+/// The most bytes of a viewer's message.
 inline constexpr std::size_t maxViewerText = 4096;
-/// The most that a text message of the server may take.
+/// The most bytes of a text message of the server.
 inline constexpr std::size_t maxServerText = std::size_t{1} << 20;
-/// Bytes of a level in one binary message, at most; its head comes in front of them.
+/// The most bytes of a level in one binary message, where they follow the head.
 inline constexpr std::size_t chunkBytes = std::size_t{256} << 10;
 inline constexpr std::size_t chunkHeadBytes = 16;
 /// A viewer acknowledges at least every ackBytes bytes of a level.
 inline constexpr std::uint64_t ackBytes = std::uint64_t{512} << 10;
-/// Entries of a series in one message, at most.
+/// The most entries of a series in one message.
 inline constexpr std::size_t seriesEntries = 4096;
-/// A server says its state again when a viewer has had no message for so long. Scripts in a page don't see
-/// the pings that keep other viewers' connections alive.
+/// A server repeats its state when a viewer has had no message for this time. Scripts in a page don't see the
+/// pings that keep other viewers' connections alive.
 inline constexpr std::chrono::seconds pulse{15};
 
-/// Why a connection is closed: WebSocket's status codes, of which 4000 to 4999 are for applications.
+/// The reason why a connection is closed: one of WebSocket's status codes, of which 4000 to 4999 are for
+/// applications.
 enum class Close : std::uint16_t {
   GoingAway = 1001,
   BadMessage = 4400,
@@ -44,7 +45,7 @@ enum class Close : std::uint16_t {
   TooMany = 4503,
 };
 
-// From a viewer.
+// Messages from a viewer.
 
 struct Hello {
   int version = protocolVersion;
@@ -53,14 +54,14 @@ struct Hello {
   std::optional<std::uint32_t> have;   // the newest frame that the viewer has
   bool operator==(const Hello&) const = default;
 };
-/// `bytes` of a level have come.
+/// Acknowledges the first `bytes` bytes of a level.
 struct Ack {
   std::uint32_t frame = 0;
   std::uint32_t level = 0;
   std::uint64_t bytes = 0;
   bool operator==(const Ack&) const = default;
 };
-/// Asks for a frame of a series, and for no others.
+/// Asks for one frame of a series, and stops other frames.
 struct Show {
   std::uint32_t index = 0;
   bool operator==(const Show&) const = default;
@@ -87,7 +88,7 @@ struct Steer {
 };
 using FromViewer = std::variant<Hello, Ack, Show, Pause, Resume, Drive, Release, Steer>;
 
-// From the server.
+// Messages from the server.
 
 /// The frames of a folder or of a list of files. Both vectors have an entry for each frame.
 struct Series {
@@ -102,7 +103,7 @@ struct Welcome {
   bool steer = false;
   std::optional<Series> series;
   std::uint32_t viewers = 0;
-  std::uint32_t pulse = 0;  // seconds after which the state comes again; 0: an older server, and it doesn't
+  std::uint32_t pulse = 0;  // seconds after which the state is repeated; 0: never (an older server)
   bool operator==(const Welcome&) const = default;
 };
 /// More of a series: its entries from `from` on.
@@ -118,7 +119,7 @@ struct State {
   std::string cause;  // why no frames come although they should; empty: nothing is wrong
   bool operator==(const State&) const = default;
 };
-/// The next binary messages are of this level, until another comes.
+/// Announces the level of the binary messages that follow.
 struct Level {
   std::uint32_t frame = 0;
   std::uint32_t level = 0;
@@ -132,7 +133,7 @@ struct Level {
   std::uint64_t dropped = 0;   // frames of which this viewer got nothing
   bool operator==(const Level&) const = default;
 };
-/// A frame that the viewer asked for can't be had.
+/// Tells a viewer that a frame that it asked for isn't available.
 struct Missing {
   std::uint32_t frame = 0;
   std::string cause;
@@ -141,7 +142,7 @@ struct Missing {
 /// The state of steering. It is sent where steering is allowed, at the beginning and after each change.
 struct Steering {
   std::uint32_t you = 0;                // the viewer's number
-  std::optional<std::uint32_t> driver;  // that of the viewer that drives
+  std::optional<std::uint32_t> driver;  // the driving viewer's number
   Controls controls;
   bool operator==(const Steering&) const = default;
 };
@@ -150,7 +151,7 @@ struct Denied {
   std::string cause;
   bool operator==(const Denied&) const = default;
 };
-/// Comes before the server closes the connection.
+/// Gives the reason before the server closes the connection.
 struct Refusal {
   std::string cause;
   bool operator==(const Refusal&) const = default;

@@ -15,21 +15,21 @@
 
 namespace vdi::stream {
 
-/// Encodes on a thread of its own and those that this starts, at a lower priority than the simulation's.
+/// Encodes on its own thread and those that the thread starts, at a lower priority than the simulation's.
 class Publisher {
  public:
-  /// The server outlives it.
+  /// The server must outlive the publisher.
   explicit Publisher(Server& server);
   /// Encodes the VDI published last in full, and hands it to the server, before it returns.
   ~Publisher();
   Publisher(const Publisher&) = delete;
   Publisher& operator=(const Publisher&) = delete;
 
-  /// Never waits. If the encoding of the last VDI hasn't begun, that VDI is dropped. If it has, the levels
-  /// that haven't been begun are dropped: the coarse levels of the new VDI come first.
+  /// Never waits. If the encoding of the last VDI hasn't begun, that VDI is dropped. If it has begun, the
+  /// levels that haven't been begun are dropped: the coarse levels of the new VDI come first.
   void publish(std::shared_ptr<const Vdi> vdi);
   std::uint64_t dropped() const;
-  /// The first VDI that couldn't be encoded, and why; empty: none. Later ones are encoded all the same.
+  /// The error of the first VDI that couldn't be encoded; empty: none. Later VDIs are still encoded.
   std::string trouble() const;
 
  private:
@@ -41,9 +41,9 @@ class Publisher {
   void encode(const Pending& pending);
 
   Server& server_;
-  std::uint32_t nextId_ = 0;  // the thread's
+  std::uint32_t nextId_ = 0;  // only the thread uses it
 
-  mutable std::mutex mutex_;  // for what follows
+  mutable std::mutex mutex_;  // guards what follows
   std::condition_variable changed_;
   std::optional<Pending> pending_;
   std::uint64_t dropped_ = 0;

@@ -7,12 +7,11 @@
 
 namespace vdi::stream {
 
-/// A file that only its owner can read. It exists as long as this object, unless another process replaces it:
-/// a file that isn't this object's stays.
+/// A file that only its owner can read. The destructor removes it, unless another process has replaced it.
 class SecretFile {
  public:
-  /// Replaces a file of that name, in the working directory as it is now if the path is relative. Throws
-  /// Error{Io} with the path as context if it can't be written.
+  /// Replaces the file at `path`, which may be relative to the present working directory. Throws Error{Io}
+  /// with the path as context if it can't be written.
   SecretFile(const std::string& path, const std::string& line);
   ~SecretFile();
   SecretFile(const SecretFile&) = delete;

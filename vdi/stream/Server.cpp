@@ -168,7 +168,7 @@ class Server::Impl {
   void accept() {
     acceptor_.async_accept([this](boost::system::error_code error, tcp::socket socket) {
       if (error == asio::error::operation_aborted || !acceptor_.is_open()) return;
-      if (error) {  // too many open files, for example: they may be fewer soon
+      if (error) {  // too many open files, for example; some may be closed soon
         pause_.expires_after(acceptPause);
         pause_.async_wait([this](boost::system::error_code cancelled) {
           if (!cancelled) accept();
@@ -183,7 +183,8 @@ class Server::Impl {
   }
 
   void serve(Plain::socket_type socket) {
-    if (isEnding_ || (connections_.size() >= options_.mostConnections && !makeRoom())) return;  // it's closed
+    if (isEnding_ || (connections_.size() >= options_.mostConnections && !makeRoom()))
+      return;  // closes the socket
     const std::uint64_t number = nextNumber_++;
     const Surroundings surroundings{hub_, site_, [this, number] { leave(number); }};
     const std::shared_ptr<Connection> made =
@@ -236,7 +237,7 @@ class Server::Impl {
 
   template <typename Do>
   void forEach(Do work) {
-    const auto all = connections_;  // of which some may go
+    const auto all = connections_;  // a copy, because some may leave
     for (const auto& [number, weak] : all) {
       if (const std::shared_ptr<Connection> connection = weak.lock()) work(*connection);
     }
@@ -252,7 +253,7 @@ class Server::Impl {
       try {
         context_.run();
         done = true;
-      } catch (const std::exception& error) {  // of one connection, which is lost
+      } catch (const std::exception& error) {  // from one connection, which is lost
         say(error.what());
       }
     }

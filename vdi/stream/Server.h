@@ -15,15 +15,15 @@ namespace vdi::stream {
 
 struct ServerOptions {
   std::string host = "127.0.0.1";    // whose address the server listens at
-  std::uint16_t port = 0;            // 0: one that is free
-  bool listens = true;               // false: it serves what adopt() gets, and nothing else
-  std::string token;                 // as requireToken says
+  std::uint16_t port = 0;            // 0: any free port
+  bool listens = true;               // false: serves only the sockets given to adopt()
+  std::string token;                 // must satisfy requireToken
   std::string page;                  // HTML, at /
   std::vector<std::string> origins;  // of other sites' pages that may connect: "https://example.org"
   double mostBytesPerSecond = 0.0;   // to each viewer; 0: no limit
   std::uint32_t mostViewers = 64;
-  /// Bytes of frames that are kept for viewers alone, the newest frame apart. Beyond them the viewer that has
-  /// taken nothing for longest is disconnected.
+  /// The most bytes of frames kept only because viewers still need them, without the newest frame. Beyond it,
+  /// the viewer that has taken nothing for longest is disconnected.
   std::uint64_t mostHeldBytes = std::uint64_t{1} << 30;
   std::uint32_t mostConnections = 256;  // of any kind, viewers included
   std::filesystem::path certificate;    // PEM, a chain; empty: no TLS
@@ -49,10 +49,11 @@ struct ServerStatus {
 /// viewer. The server keeps only the newest frame and those that some viewer still needs.
 class Server {
  public:
-  /// Listens when it returns. Throws Error: Io for an address that can't be had, or a certificate or key that
-  /// can't be read; InvalidArgument for a token that requireToken refuses, or a certificate without a key.
+  /// The server listens when the constructor returns. Throws Error: Io for an unavailable address, or a
+  /// certificate or key that can't be read; InvalidArgument for a token that requireToken refuses, or a
+  /// certificate without a key.
   explicit Server(ServerOptions options);
-  /// Tells viewers that it ends, and waits for them two seconds at most.
+  /// Tells viewers that the server ends, and waits for them two seconds at most.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

@@ -70,28 +70,28 @@ struct Wish {
   bool operator==(const Wish&) const = default;
 };
 
-/// Whether the VDIs of the same step would differ.
+/// Whether the wish changes the VDIs of the same step.
 bool changesVdi(const Wish& wish);
 /// The reason why the wish can't be granted under these controls; empty if it can.
 std::string objectionTo(const Wish& wish, const Controls& controls);
-/// Adds a later wish, which wins.
+/// Merges a later wish into `wish`. The later one wins.
 void merge(Wish& wish, const Wish& later);
 
 struct SteeringRequest {
-  std::uint32_t viewer = 0;  // who asked last
-  Wish wish;                 // all that has been asked for since requests were taken last
+  std::uint32_t viewer = 0;  // that asked last
+  Wish wish;                 // all wishes since the last take()
 };
 
 /// A wish as text and back, for other ranks. These three are in SteeringJson.cpp.
 std::string textOf(const Wish& wish);
 /// Reads a text that textOf has made. Throws Error{Format} for other texts.
 Wish wishOf(std::string_view text);
-/// One object of JSON on one line, as the log has it: {"step":…,"time":…,"viewer":…,"steer":{…}}.
+/// A line of the steering log, one JSON object: {"step":…,"time":…,"viewer":…,"steer":{…}}.
 std::string logEntryOf(const SteeringRequest& request, std::int64_t step, double time);
 /// The wish in words for people, such as "feed = 0.04, viewpoint (1, 2, 3)".
 std::string summaryOf(const Wish& wish);
 
-/// Carries wishes from the network's thread to the simulation's. Holds one request, however many come.
+/// Carries wishes from the network's thread to the simulation's. Merges waiting wishes into one request.
 class Wishes {
  public:
   /// Never waits.

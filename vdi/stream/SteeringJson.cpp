@@ -17,7 +17,7 @@ using Json = nlohmann::json;
 
 constexpr std::size_t maxPresets = 64;
 
-/// Null where there is none.
+/// The field of an object; null if it is missing.
 const Json& at(const Json& object, const char* name) {
   static const Json none;
   const auto found = object.find(name);

@@ -1,4 +1,4 @@
-// Wishes and controls as JSON. Included by sources alone: it drags in the library.
+// Wishes and controls as JSON. Only sources include this header, because it includes the JSON library.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -10,7 +10,7 @@ namespace vdi::stream {
 
 /// Throws Error{Format}.
 [[noreturn]] void refuse(const std::string& what);
-/// The fields of "steer" but for its type, those that are set alone.
+/// The fields of "steer" that are set, without its type.
 nlohmann::json jsonOf(const Wish& wish);
 /// The fields of "steering" that hold controls.
 nlohmann::json jsonOf(const Controls& controls);

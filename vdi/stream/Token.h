@@ -9,7 +9,7 @@
 
 namespace vdi::stream {
 
-/// Characters that a token must have at least. Ours have 64.
+/// The fewest characters of a token. Those of randomToken have 64.
 inline constexpr std::size_t shortestToken = 16;
 
 /// 32 bytes from the system's source of randomness, in hexadecimal. Throws Error{Io} without one.
@@ -21,7 +21,7 @@ std::string tokenIn(const std::filesystem::path& file);
 /// them letters, digits, '-', '.', '_' or '~', because links contain it. `origin` names its source.
 void requireToken(const std::string& token, const std::string& origin);
 
-/// Compares tokens in a time that says nothing about the right one. It keeps a digest alone.
+/// Compares tokens in a time that reveals nothing about the right one, of which it keeps only a digest.
 class TokenCheck {
  public:
   explicit TokenCheck(std::string_view token);

@@ -37,7 +37,7 @@ void Transport::writeSome(const FirstBuffers<boost::asio::const_buffer>& buffers
 }
 
 void Transport::tearDown(boost::beast::role_type role, Completion done) {
-  // Beast's own functions for both types are found by their arguments.
+  // Argument-dependent lookup finds Beast's functions for both types.
   std::visit([&](auto& stream) { async_teardown(role, stream, std::move(done)); }, stream_);
 }
 

@@ -22,8 +22,8 @@ namespace vdi::stream {
 /// TCP, or one end of a pair of local sockets.
 using Plain = boost::beast::basic_stream<boost::asio::generic::stream_protocol>;
 
-/// A handler of any type, called once. It hides the types of Beast's operations, so that the compiler makes
-/// those of the streams below for one type. They take most of the time in which Beast compiles.
+/// A handler of any type, called once. It hides the types of Beast's operations, so that the compiler
+/// instantiates those of the streams below, which take most of Beast's compile time, for one type only.
 class Completion {
  public:
   template <typename Handler>
@@ -100,7 +100,7 @@ class Transport {
 
   executor_type get_executor() { return next_layer().get_executor(); }
   Plain& next_layer();
-  /// Null without TLS.
+  /// The TLS stream; null without TLS.
   Encrypted* tls() { return std::get_if<Encrypted>(&stream_); }
 
   template <typename Buffers, typename Handler>
@@ -131,7 +131,7 @@ class Transport {
   std::variant<Plain, Encrypted> stream_;
 };
 
-/// Beast finds this function by its arguments.
+/// Beast finds this function by argument-dependent lookup.
 template <typename Handler>
 void async_teardown(boost::beast::role_type role, Transport& transport, Handler&& handler) {
   transport.tearDown(role, Completion(std::forward<Handler>(handler)));

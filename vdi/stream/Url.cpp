@@ -15,7 +15,7 @@ namespace {
 constexpr std::uint16_t httpPort = 80;
 constexpr std::uint16_t httpsPort = 443;
 
-/// Host and port, apart.
+/// Splits an authority into host and port. Returns false if it is malformed.
 bool split(std::string_view authority, Url& url) {
   std::string_view port;
   if (authority.starts_with('[')) {

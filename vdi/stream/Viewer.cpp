@@ -48,7 +48,7 @@ void Hub::provide(const FramePtr& frame, Clock::time_point now) {
 
 std::set<std::shared_ptr<const EncodedLevel>> Hub::heldFor(const Viewer& viewer) const {
   std::set<std::shared_ptr<const EncodedLevel>> levels;
-  if (viewer.isStalled()) return levels;  // it's on its way out
+  if (viewer.isStalled()) return levels;  // it is about to be disconnected
   for (const auto& level : viewer.held()) levels.insert(level);
   if (newest_) {
     for (const auto& level : newest_->levels) levels.erase(level);
@@ -151,7 +151,7 @@ std::vector<std::shared_ptr<const EncodedLevel>> Viewer::held() const {
 }
 
 void Viewer::refuse(Close code, std::string cause) {
-  // A viewer that was refused for another reason may stall before the message under way comes to its end.
+  // A viewer that was refused for another reason may stall before the message under way ends.
   if (!farewell_ || code == Close::Stalled) farewell_ = {code, std::move(cause)};
   outbox_.close();
   announced_.reset();

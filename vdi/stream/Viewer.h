@@ -28,7 +28,7 @@ class Hub {
     std::string token;
     double mostBytesPerSecond = 0.0;  // to each viewer; 0: no limit
     std::uint32_t mostViewers = 0;
-    /// Bytes of frames that may be kept for viewers alone, the newest frame apart.
+    /// The most bytes of frames kept only because viewers still need them, without the newest frame.
     std::uint64_t mostHeldBytes = std::uint64_t{1} << 30;
     /// Called when a viewer wants that frame of the series. Answer with provide or miss.
     std::function<void(std::uint32_t index)> show;
@@ -40,8 +40,8 @@ class Hub {
   /// A random session. Throws Error{Io} as randomToken.
   explicit Hub(Options options);
 
-  /// Offers the newest frame, or more levels of it, to all viewers that don't look at an older one. Ends the
-  /// phase Waiting, unless that has a cause: it becomes Live.
+  /// Offers the newest frame, or more levels of it, to all viewers that don't look at an older one. Changes
+  /// the phase from Waiting to Live, unless setPhase gave a cause.
   void publish(FramePtr frame, Clock::time_point now);
   /// Offers a frame of the series to the viewers that asked for it.
   void provide(const FramePtr& frame, Clock::time_point now);
@@ -62,7 +62,7 @@ class Hub {
   std::uint32_t viewerCount() const { return static_cast<std::uint32_t>(viewers_.size()); }
   std::uint64_t published() const { return published_; }
   State state() const { return {phase_, viewerCount(), cause_}; }
-  /// Bytes of frames that are kept for viewers alone, the newest frame apart.
+  /// The bytes of frames kept only because viewers still need them, without the newest frame.
   std::uint64_t heldBytes() const;
 
  private:
@@ -82,10 +82,10 @@ class Hub {
   FramePtr newest_;
   std::optional<Series> series_;
   std::uint64_t published_ = 0;
-  std::set<Viewer*> viewers_;  // that said hello and were let in
+  std::set<Viewer*> viewers_;  // viewers that have been admitted
   std::uint32_t lastNumber_ = 0;
   std::optional<std::uint32_t> driver_;
-  bool driverPaused_ = false;  // the driver's last wish on this was a pause
+  bool driverPaused_ = false;  // the driver has paused the simulation
   Controls controls_;
   std::uint64_t steeringVersion_ = 0;  // counts changes of the driver and of the controls
 };
@@ -105,7 +105,7 @@ class Viewer {
   bool isWelcome() const { return isWelcome_; }
   /// Call when the viewer is gone; the hub forgets it.
   void leave();
-  /// Whether it has to go at once, even in the middle of a message.
+  /// Whether the viewer must be disconnected at once, even in the middle of a message.
   bool isStalled() const { return farewell_ && farewell_->code == Close::Stalled; }
 
   struct Binary {

@@ -63,7 +63,7 @@ std::vector<std::string> layoutNames() {
 
 std::vector<Part> decompose(const glm::ivec3& size, const glm::ivec3& blocks, Layout layout, Joint joint,
                             int ranks, std::uint32_t seed) {
-  // Shared points: cells are divided, and a piece holds the points of its cells. Otherwise values are
+  // With shared points, cells are divided, and a piece holds the points of its cells. Otherwise values are
   // divided.
   const bool shared = joint == Joint::SharedPoints;
   const glm::ivec3 steps = shared ? size - 1 : size;
