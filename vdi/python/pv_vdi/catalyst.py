@@ -203,8 +203,8 @@ class Catalyst:
         of two. Values are of cells, or of points, of which a block has one more per axis. On staggered grids the values lie
         `offset` cells (x, y, z; -0.5 to 0.5) beside these.
 
-        Arrays are kept alive: change them in place between steps, or set others. They are used in place, whatever their strides:
-        slices, transposed arrays, one field of several. Raises ValueError for a shape that the block doesn't have and
+        Arrays are kept alive: change them in place between steps, or set others. They are used in place, whatever their
+        strides: slices, transposed arrays, one field of several. Raises ValueError for a shape that the block doesn't have and
         for a type that the engine doesn't know; ranks without such a fault raise CatalystError then."""
         association = _POINTS if points else _CELLS
         with _or_refused(self._library.vdi_catalyst_set_array_strided, self._handle, b"refused", -1, association, 1, None,
