@@ -26,7 +26,8 @@ std::string numberAt(const std::string& text, std::size_t& at) {
   return text.substr(begin, at - begin);
 }
 
-/// Whether it is a link to a file of the same folder, such as latest.vdi, at once or by way of other links.
+/// Whether the entry is a link to a file of the same folder, such as latest.vdi, directly or through other
+/// links.
 bool isAnotherName(const std::filesystem::directory_entry& entry) {
   std::error_code error;
   const std::filesystem::path target = std::filesystem::read_symlink(entry.path(), error);

@@ -14,13 +14,13 @@
 
 namespace vdi::apps {
 
-/// Signature that shows a file's change without reading the file.
+/// Properties that reveal a change of a file without reading it.
 struct FileLook {
   std::uintmax_t size = 0;
   std::filesystem::file_time_type time;
   bool operator==(const FileLook&) const = default;
 };
-/// nullopt if the file is gone.
+/// The file's properties; nullopt if the file is gone.
 std::optional<FileLook> lookAt(const std::filesystem::path& file);
 
 class FolderWatch {

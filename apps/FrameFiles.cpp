@@ -31,7 +31,7 @@ stream::Clock::time_point writtenAt(const std::filesystem::path& file) {
   return age.count() > 0 ? now - std::chrono::duration_cast<stream::Clock::duration>(age) : now;
 }
 
-/// Longest time that a program may take to write a file under its final name.
+/// The time that a program may take to write a file under its final name.
 constexpr std::chrono::seconds writingTime{1};
 constexpr char damagedOrGone[] = "the file is damaged or gone";
 
@@ -123,14 +123,14 @@ void FrameFiles::look() {
   }
 }
 
-/// The watch reports the file again when it changes.
+/// Skips a file for now. The watch reports it again when it changes.
 void FrameFiles::leaveOut(const std::filesystem::path& file, const std::string& what) {
   Incomplete& incomplete = incomplete_[file];
   incomplete.what = what;
   incomplete.since = stream::Clock::now();
 }
 
-/// Logs each incomplete file once. In a followed folder such a file may still be being written, so it gets
+/// Logs each incomplete file once. In a followed folder, a program may still be writing the file, so it gets
 /// some time first.
 void FrameFiles::tellIncomplete() {
   const auto patience = follows() ? writingTime : std::chrono::seconds(0);
@@ -186,7 +186,7 @@ void FrameFiles::add(const std::vector<std::filesystem::path>& files) {
     }
   }
   if (entries.size() > 0) server_->append(std::move(entries));
-  // A viewer that reads this knows all of the series.
+  // A viewer that receives this phase has the whole series.
   if (!follows()) server_->setPhase(stream::Phase::Ended);
   for (auto index = static_cast<std::uint32_t>(series_.size()); index-- > unshown;) {
     if (send(index, [this](stream::FramePtr frame) { server_->publish(std::move(frame)); })) return;
@@ -215,7 +215,8 @@ bool FrameFiles::send(std::uint32_t index, const std::function<void(stream::Fram
   }
 }
 
-/// Why the file can't be the entry's any more; empty if it can. A file that is gone may still be kept.
+/// The reason why the file isn't the entry's any more; empty if it may be. A file that is gone may still be
+/// kept.
 std::string FrameFiles::changeOf(Entry& entry) {
   const std::optional<FileLook> look = lookAt(entry.file);
   if (!look || *look == entry.content.look) return {};

@@ -27,11 +27,11 @@ namespace vdi::apps {
 class FrameFiles {
  public:
   struct Options {
-    std::vector<std::filesystem::path> files;     // a finished series; otherwise
-    std::filesystem::path folder;                 // its files are the series
+    std::vector<std::filesystem::path> files;     // a finished series; empty: `folder` is set
+    std::filesystem::path folder;                 // the folder whose files are the series
     bool follows = true;                          // whether to watch the folder for new files
     std::chrono::milliseconds interval{250};      // between listings of a folder that reports no changes
-    std::function<void(const std::string&)> log;  // one line, from any thread
+    std::function<void(const std::string&)> log;  // gets one line, from any thread
   };
   explicit FrameFiles(Options options);
   ~FrameFiles();
@@ -50,8 +50,8 @@ class FrameFiles {
  private:
   struct Content {
     FileLook look;
-    /// Tells one VDI from another, without reading their lists: it has a checksum of the table with
-    /// the checksums of all chunks.
+    /// Distinguishes VDIs without their lists: the header has a checksum of the chunk table, which has the
+    /// checksums of all chunks.
     std::vector<std::byte> header;
     std::optional<double> time;
     std::uint64_t step = 0;
@@ -59,7 +59,7 @@ class FrameFiles {
   struct Entry {
     std::filesystem::path file;
     Content content;
-    bool isDamaged = false;  // as far as it was read
+    bool isDamaged = false;  // the file was bad when it was last read in full
   };
   static Content contentOf(const std::filesystem::path& file);
   Entry* entryWith(const std::filesystem::path& file, const Content& content);
@@ -89,7 +89,7 @@ class FrameFiles {
   std::string folderTrouble_;
 
   int wakeup_;        // an eventfd; signals that a member below has changed
-  std::mutex mutex_;  // for the next two
+  std::mutex mutex_;  // guards the next two members
   std::deque<std::uint32_t> wanted_;
   bool isEnding_ = false;
   std::thread thread_;

@@ -109,7 +109,7 @@ class SeriesWalk {
   }
 
  private:
-  /// Whether the whole series is known. A server that was started again may have sent a part of it so far.
+  /// Whether the whole series is known. A restarted server may have sent only a part of it so far.
   static bool hasEnded(const stream::Client::Standing& standing) {
     return standing.series && standing.hasState && standing.state.phase == stream::Phase::Ended;
   }

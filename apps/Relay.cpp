@@ -129,8 +129,8 @@ void Relay::pass(stream::Received received) {
   finish(id);
 }
 
-/// Adds a level to its frame, which it may begin. The other server leaves out levels that are too coarse for
-/// its line to here, so the first one that comes is this server's level 0.
+/// Adds a level to its frame, or begins the frame with it. The other server skips levels that are too coarse
+/// for the connection, so the first one that arrives becomes level 0.
 void Relay::add(stream::Received received) {
   const stream::Level& level = received.level;
   auto frame = std::make_shared<stream::Frame>();

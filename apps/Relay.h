@@ -1,4 +1,4 @@
-// Offers another server's frames here.
+// Offers another server's frames to its own viewers.
 #pragma once
 
 #include <chrono>
@@ -43,13 +43,13 @@ class Relay {
   std::string session_;  // the other server's
   std::size_t seriesPassed_ = 0;
   std::optional<stream::Phase> phase_;            // the other server's
-  stream::State told_;                            // to this server's viewers, but for their number
+  stream::State told_;                            // the state that viewers know, without their number
   std::shared_ptr<const stream::Frame> current_;  // the frame that is arriving
   std::uint32_t firstLevel_ = 0;                  // current_'s first level, as the other server counts
   std::list<stream::FramePtr> whole_;             // the latest whole frames
   std::optional<std::uint32_t> newest_;
   std::optional<std::uint32_t> asked_;  // the wanted frame of the series
-  std::mutex mutex_;                    // for the next one
+  std::mutex mutex_;                    // guards wanted_
   std::deque<std::uint32_t> wanted_;
   std::unique_ptr<stream::Server> server_;
   stream::Client client_;

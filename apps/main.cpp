@@ -68,7 +68,7 @@ Outcome outcomeOf(const CLI::App& app, const CLI::ParseError& error, bool speaks
   return {badUsage, fmt::format("{} (see '{} --help')", firstLine(error.what()), command)};
 }
 
-/// Ranks with different arguments would wait for each other in different places.
+/// Requires equal arguments, because ranks with different ones would wait for each other in different calls.
 void requireEqualArguments(const vdi::comm::Communicator& world, int argc, char** argv) {
   std::string all;
   for (int i = 1; i < argc; ++i) all += std::string(argv[i]) + '\n';

@@ -136,8 +136,8 @@ The table of suite stream has the frames per second that a viewer decoded and dr
 viewpoint, and their age at that moment. The age counts from the beginning of the VDI's generation ('live':
 made and published as the extractor VDIStream does) or from the file's appearance ('folder': followed as vdi
 serve does). Server and viewer share this machine and its device; --rates limit the bytes between them. 'view'
-is the viewer's time for a level, 'encode' the server's for all levels. 'crowd' is the time of a VDI made and
-published beside eight viewers, one of whom takes nothing and one vanishes, over that without viewers.
+is the viewer's time for a level, 'encode' the server's for all levels. 'crowd' is the time to make and publish
+a VDI with eight viewers, divided by the time without viewers. One of the eight takes nothing, one vanishes.
 The table of suite ranks has the wall time of the slowest rank for each stage, and whole frames. 'faster' and
 'more' compare the frame and VDIs/s with those of one rank with the same layout. DVR is volume_rendering_ms.
 The JSON has these fields in addition:

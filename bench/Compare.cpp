@@ -81,7 +81,7 @@ int compareBenches(const std::filesystem::path& before, const std::filesystem::p
     if (wasBytes >= 0.0 && isBytes > 1.05 * wasBytes) tell(key, "stored_bytes", wasBytes, isBytes);
     const double wasSsim = figure(found->second, "ssim");
     const double isSsim = figure(row, "ssim");
-    // different reference pictures
+    // SSIM with different reference pictures isn't comparable.
     if (figure(found->second, "truth_rate") != figure(row, "truth_rate")) continue;
     if (wasSsim >= 0.0 && isSsim >= 0.0 && isSsim < wasSsim - 0.002) tell(key, "ssim", wasSsim, isSsim);
   }

@@ -50,10 +50,10 @@ std::uint64_t sumOf(const comm::Communicator& comm, std::uint64_t value) {
   return sum[0];
 }
 
-/// A generator of one rank takes the extent of that rank's blocks as the scene and places samples
-/// in it. Therefore a block of one value marks each corner of the whole scene that the rank's box
-/// doesn't reach. Its volume is too small for any sample. It isn't smaller, because faces closer
-/// than a thousandth of a spacing would become one.
+/// A generator of one rank takes the extent of that rank's blocks as the scene and places samples in it.
+/// Therefore a block of one value marks each corner of the whole scene that the rank's box doesn't reach. Its
+/// volume is too small for any sample, but its faces are farther apart than a thousandth of a spacing,
+/// because closer ones would become one.
 std::vector<Block> cornerBlocks(const Scene& scene, const Box& mine, ScalarType type) {
   const double thin = 0.004 * scene.minSpacing;
   const std::shared_ptr<std::byte[]> zero(new std::byte[sizeOf(type)]());

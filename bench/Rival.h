@@ -51,7 +51,7 @@ class IcetRival {
   /// Frees the device's memory.
   void dropBlocks();
 
-  /// `ours` is the root's picture of the same input by VdiGenerator::renderVolume; other ranks' is
+  /// `ours` is the root's picture of the same input by VdiGenerator::renderVolume; other ranks' pictures are
   /// ignored.
   RivalFigures measure(ClockRaiser& clock, const FrameInput& input, int repeats,
                        const std::optional<Image>& ours);

@@ -256,7 +256,7 @@ class StreamSuite {
   }
 
  private:
-  /// SSIM of a view to the true picture.
+  /// SSIM between a view and the true picture.
   struct Likeness {
     double whole = 0.0;
     double object = 0.0;  // over the object's bounding box, where no empty background hides errors

@@ -7,8 +7,7 @@ namespace vdi::bench {
 
 namespace {
 
-/// The paper's configurations (its section 6). The fields have the size, type and character of its
-/// data sets, and their names.
+/// The paper's configurations (its section 6). The fields have the size, type and character of its data sets.
 std::vector<DataSet> suiteSets(const std::string& suite) {
   if (suite == "paper") {
     return {{"kingsnake-like", "coil", "", "1024x1024x795", "u8"},

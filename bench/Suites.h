@@ -34,7 +34,7 @@ struct BenchOptions {
   std::vector<std::string> scalings{"strong", "weak"};
   std::vector<std::string> layouts{"slabs", "interleaved", "random"};
   std::vector<int> rankCounts;  // empty: 1, 2, 4 ... and all
-  std::string sizePerRank;      // in weak scaling; empty: half of deal.size on each axis
+  std::string sizePerRank;      // in weak scaling; empty: half of decomposition.size on each axis
   // For the suite `viewpoints`:
   int viewpoints = 100;
   double turn = 20.0;  // degrees

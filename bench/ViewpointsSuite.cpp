@@ -82,7 +82,7 @@ std::vector<Camera> turnedCameras(const Camera& camera, double degrees) {
           apps::turned(camera, 0.0, degrees), apps::turned(camera, 0.0, -degrees)};
 }
 
-/// The truth for views.
+/// The reference for a view.
 struct ViewTruth {
   Camera camera;
   io::Picture picture;                // by volume rendering at the rate of --truth-rate
@@ -101,7 +101,7 @@ double missingOf(const ViewTruth& truth, std::span<const glm::u8vec4> pixels) {
   return static_cast<double>(missing) / static_cast<double>(pixels.size());
 }
 
-/// The kinds of viewpoints: all around, or turned a little.
+/// One kind of viewpoints, all around or turned a little, with their references.
 struct Views {
   std::string name;
   std::vector<ViewTruth> truths;
