@@ -1,5 +1,5 @@
-// Finds the regions of a new picture that may show material. Rays of the other regions, which are
-// most, skip their search. Twin of shaders/cull.comp and packet.glsl, whose comments give the
+// Finds the regions of a new picture that may show material. Rays of the other regions, the
+// majority, skip their search. Twin of shaders/cull.comp and packet.glsl, whose comments give the
 // reasons: the rays at a region's corners bound the rays between them.
 
 import {RAYS, REGION_SHIFT, uniformsOf} from "./traverse.js";

@@ -83,7 +83,7 @@ function tileMasks(heads, width, height) {
  * @typedef {object} Ends
  * @property {number} front
  * @property {number} back
- * @property {number} reach how far they are from its own depths, in slopes
+ * @property {number} reach their distance from the supersegment's own depths, in slopes
  */
 
 const REACH_UNIT = 2;         // slopes

@@ -5,7 +5,7 @@
 const MOST_DECIMALS = 15;  // doubles have no more digits
 
 /**
- * The value with enough digits to differ from its neighbours, in a narrow range, too.
+ * The value with enough digits to differ from its neighbours, even in a narrow range.
  * @param {number} value
  * @param {number} span distance between the least and the greatest value
  */
@@ -15,7 +15,7 @@ export function numberText(value, span) {
   const decimals = 2 - Math.floor(Math.log10(span));
   const fixed = value.toFixed(Math.min(Math.max(decimals, 0), MOST_DECIMALS));
   if (size < 1e5 && size >= 1e-3) return fixed;
-  const digits = Math.floor(Math.log10(size)) + decimals;  // behind the first one
+  const digits = Math.floor(Math.log10(size)) + decimals;  // after the first one
   if (digits <= 2) return value.toExponential(2);
   const short = value.toExponential(Math.min(digits, MOST_DECIMALS));
   return size >= 1e5 && size < 1e15 && fixed.length <= short.length ? fixed : short;

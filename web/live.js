@@ -50,8 +50,8 @@ const FIRST_WAIT_MS = 500;
 const LONGEST_WAIT_MS = 10000;
 const ANSWER_MS = 10000;       // time for a server to answer
 const RATE_MS = 4000;          // the rate is a mean over this time
-const SILENT_PULSES = 3;       // a server that has missed so many is gone
-const GRACE_MS = 1000;         // a page that was asleep may run timers before it gets the messages that have come
+const SILENT_PULSES = 3;       // a server that misses this many counts as lost
+const GRACE_MS = 1000;         // after sleep, a page may run timers before it gets messages that have arrived
 const WRONG_TOKEN = 4401;
 const OTHER_VERSION = 4409;
 
@@ -71,7 +71,7 @@ export class Live {
     this.state = "connecting";
     /** The reason for being lost or refused, in one line. */
     this.cause = "";
-    /** Why the server, which is there, gets no frames: one that relays may have lost its source. */
+    /** Why the connected server gets no frames: a relay may have lost its source. */
     this.trouble = "";
     /** Whether this connection's server has been live. A finished series never is. */
     this.hasBeenLive = false;
@@ -84,7 +84,7 @@ export class Live {
     this.series = null;
     /** @type {number | null} the frame of the series that the user wants; null: the newest */
     this.wanted = null;
-    /** @type {number | null} the wanted frame, once it turns out that it can't be shown */
+    /** @type {number | null} the wanted frame, if it can't be shown */
     this.missed = null;
     this.viewers = 0;
     /** @type {Steering | null} null: the server has sent none */
@@ -97,7 +97,7 @@ export class Live {
     /** @type {Socket | undefined} */
     this.socket = undefined;
     this.assembler = new LevelAssembler();
-    /** Bytes of the level under way. Acknowledging the end of an earlier one leaves them alone. */
+    /** Acknowledged bytes of the level under way. Acknowledging an earlier level's end doesn't change them. */
     this.acknowledged = 0;
     this.madeAt = 0;
     /** @type {{at: number, bytes: number}[]} */
@@ -113,7 +113,7 @@ export class Live {
     this.isDecoding = false;
     this.failures = 0;
     this.retryAt = 0;
-    /** The longest silence of a server that is there, in milliseconds; 0: the server promises nothing. */
+    /** The longest silence of a connected server, in milliseconds; 0: the server promises nothing. */
     this.patience = 0;
     this.heardAt = 0;
     /** @type {ReturnType<typeof setTimeout> | undefined} */
@@ -214,8 +214,8 @@ export class Live {
   }
 
   /**
-   * Notices a server that is silent for too long. No event reports a line that was cut in the
-   * middle: a laptop that slept, or a tunnel that hangs.
+   * Notices a server that is silent for too long. No event reports a connection that breaks
+   * silently, as when a laptop sleeps or a tunnel hangs.
    * @param {boolean} [isLast] whether this is the second look, after messages had time to come in
    */
   watch(isLast = false) {
@@ -346,7 +346,8 @@ export class Live {
   }
 
   /**
-   * Whether the user has chosen another frame, which will come. A server sends the newest one first.
+   * Whether the user has chosen another frame, which the server has. A server sends the newest one
+   * first.
    * @param {number} frame
    */
   isUnwanted(frame) {
@@ -356,7 +357,7 @@ export class Live {
   }
 
   /**
-   * Hands a level to the decoder, in place of one that waits for it.
+   * Hands a level to the decoder, and drops one that waits for it.
    * @param {Pending} pending
    */
   enqueue(pending) {

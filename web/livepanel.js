@@ -53,7 +53,7 @@ function ageText(seconds) {
 }
 
 /**
- * Whether the run has ended in order and its server is gone. The page looks for another one.
+ * Whether the run has ended in order and its server is gone. The page looks for another run.
  * @param {Live} live
  */
 function isGone(live) {

@@ -36,8 +36,8 @@ function refuse(what) {
 
 /**
  * @typedef {{type: "welcome", version: number, session: string, series: Series | null,
- *            viewers: number, steer: boolean, pulse: number}} Welcome `pulse`: the server lets no more
- *     than so many seconds pass without a message; 0: no such promise
+ *            viewers: number, steer: boolean, pulse: number}} Welcome `pulse`: the most seconds between
+ *     two messages of the server; 0: no limit
  * @typedef {{type: "series", from: number} & Series} SeriesPart a series' further frames, beginning
  *     at `from`
  * @typedef {{type: "error", cause: string}} Refusal
@@ -72,7 +72,7 @@ const MOST_LEVEL_BYTES = 1 << 30;
 const MOST_LEVELS = 16;
 const MOST_LISTS = 32768;        // along a side
 const MOST_SUPERSEGMENTS = 1024; // in a list, maxSupersegments of vdi/core/Budget.h
-const MOST_SAMPLES = 64;         // in a voxel, and of voxels to a sample
+const MOST_SAMPLES = 64;         // per voxel, and voxels per sample
 const MOST_ENTRIES = 64;         // parameters or presets
 const PART_HEADER_BYTES = 16;
 const FIRST_ROOM = 1 << 20;

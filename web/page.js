@@ -45,7 +45,7 @@ function colorOf(hex) {
 }
 
 const MOTION_MS = 350;
-const NOTICE_MS = 5000;   // time for reading that a file can't be opened, over a server's frames
+const NOTICE_MS = 5000;   // time for which the message that a file can't be opened covers a server's frames
 const FRAMES_PER_SECOND = 10;
 
 /** The settings in the URL's fragment. */
@@ -68,16 +68,16 @@ export class Page {
     this.vdi = undefined;
     this.frame = 0;
     this.isPlaying = false;
-    /** Counts how often Play started or ended. A loop of an earlier start ends. */
+    /** Counts starts and ends of Play, so that the loop of an earlier start ends. */
     this.plays = 0;
     /** Counts requests for frames. A late answer to an older request is dropped. */
     this.request = 0;
     this.ownBackground = false;
     /** @type {Promise<void> | undefined} of files that are being opened */
     this.opening = undefined;
-    /** What a file is to be blamed for, while a server's frames go on. */
+    /** The failure to open a file, shown while a server's frames go on. */
     this.notice = "";
-    /** @type {Camera | undefined} the last camera of a motion to the VDI's viewpoint that isn't over */
+    /** @type {Camera | undefined} the latest camera of an unfinished motion to the VDI's viewpoint */
     this.homeward = undefined;
     this.viewer.onRest = () => {
       this.keepInUrl();
@@ -160,7 +160,7 @@ export class Page {
     return inside || !middle.every(Number.isFinite) ? focal : middle;
   }
 
-  /** The scene's; 0 without one. */
+  /** The length of the scene's diagonal; 0 without a scene. */
   diagonal() {
     const {vdi} = this;
     const diagonal = vdi ? length(minus(vdi.bounds[1], vdi.bounds[0])) : 0;
@@ -205,7 +205,7 @@ export class Page {
     else if (this.vdi) this.setCamera(this.vdi.camera, false);
   }
 
-  /** How many frames there are to choose from. */
+  /** Number of frames to choose from. */
   count() {
     return this.source?.count ?? this.live?.count() ?? 0;
   }
@@ -264,8 +264,8 @@ export class Page {
   }
 
   /**
-   * Moves the camera to the viewpoint of the VDI on show if it was at the former one's. Another
-   * camera stays, unless it has the other kind of projection.
+   * Moves the camera to the viewpoint of the VDI on show if it was at the former VDI's. Otherwise
+   * the camera stays, unless its kind of projection differs.
    * @param {PreparedVdi | undefined} before the former one
    */
   follow(before) {
@@ -316,7 +316,7 @@ export class Page {
 
   async playOn() {
     const {plays} = this;
-    let missed = 0;  // frames in a row, behind the one on show
+    let missed = 0;  // consecutive frames after the one on show
     while (plays === this.plays && this.count() > 0) {
       const next = (this.frame + 1 + missed) % this.count();
       const pause = new Promise((resolve) => setTimeout(resolve, 1000 / FRAMES_PER_SECOND));
@@ -436,7 +436,7 @@ export class Page {
   }
 }
 
-/** Lets keys move the view from the start. A ring around the view would tell nothing then. */
+/** Focuses the view, without a focus ring, so that keys move it from the start. */
 function takeFocus() {
   const {activeElement} = document;
   const view = element("view");

@@ -49,8 +49,8 @@ function cornerOf(bounds, corner, origin) {
 }
 
 /**
- * Edges of the box as ends of lines, from the camera's position. An edge is in front if one of its faces looks at the camera.
- * All material in the box is behind it.
+ * Edges of the box as ends of lines, relative to the camera's position. An edge is in front if one
+ * of its faces faces the camera. All material in the box is behind it.
  * @param {[Vec3, Vec3]} bounds
  * @param {Camera} camera
  * @param {boolean} inFront
@@ -196,8 +196,8 @@ export class Renderer {
   }
 
   /**
-   * Uploads how the supersegments of the VDI lean, from its `leaning`. Throws Error if the GPU can't
-   * hold it.
+   * Uploads the slopes of the VDI's supersegments, from its `leaning`. Throws Error if the GPU
+   * can't hold it.
    * @param {() => Promise<void> | undefined} pause as for setVdi
    */
   async setLeaning(pause) {
@@ -218,7 +218,7 @@ export class Renderer {
     for (const texture of [oldHeads, oldTiles]) gl.deleteTexture(texture);
   }
 
-  /** Whether pictures of the VDI can be sheared: it is known how its supersegments lean. */
+  /** Whether the VDI can be drawn sheared, which needs its supersegments' slopes. */
   canShear() {
     return this.smooth && (this.loaded?.textures.length ?? 0) > 3;
   }
@@ -243,7 +243,7 @@ export class Renderer {
    * Draws rows [firstRow, endRow) of a picture for a canvas of the present size. Rows count from
    * the bottom. The picture becomes visible with `finishPicture`.
    * @param {Camera} camera
-   * @param {number} scale canvas pixels to one of the picture, >= 1
+   * @param {number} scale canvas pixels per pixel of the picture, >= 1
    * @param {number} firstRow
    * @param {number} endRow
    * @param {boolean} [sheared] only if canShear()
@@ -324,7 +324,7 @@ export class Renderer {
       gl.uniform1f(uniform("slopeUnit"), leaning.slopeUnit / step);
       gl.uniform4fv(uniform("boxFaces"), leaning.faces.flat());
     }
-    const units = [0, 1, 2, 5];  // pictures have the others
+    const units = [0, 1, 2, 5];  // pictures use the others
     ["heads", "segments", "tiles", "slopes"].slice(0, textures.length).forEach((name, i) => {
       gl.activeTexture(gl.TEXTURE0 + units[i]);
       gl.bindTexture(gl.TEXTURE_2D_ARRAY, textures[i]);

@@ -1,5 +1,5 @@
-// How the fronts and backs of supersegments lean from list to list. Twin of vdi/reference/Slopes.cpp,
-// which has the rules.
+// Finds the slopes of supersegments' fronts and backs from list to list. Twin of
+// vdi/reference/Slopes.cpp, which has the rules.
 
 import {basisOf, pixelSizeOf, toView} from "./camera.js";
 import {COUNT_BITS, leaningHeads, supersegmentsOf} from "./heads.js";
@@ -8,7 +8,7 @@ import {dot} from "./vector.js";
 /** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
 
 /**
- * The data that sheared pictures need beside a decoded VDI.
+ * The data that sheared pictures need besides a decoded VDI.
  * @typedef {object} Leaning
  * @property {Uint32Array} slopes a word for each supersegment: slopes of front x, front y, back x and
  *   back y, a signed byte each, in units of slopeUnit
@@ -27,7 +27,8 @@ const TIE = 1 / 64;
 const LEAST_OPACITY = 0.05;
 
 /**
- * The six faces of the VDI's box: it is where dot(xyz, p) >= w. An empty box counts as all space.
+ * The six faces of the VDI's box, which is where dot(xyz, p) >= w. An empty box counts as all
+ * space.
  * @param {PreparedVdi} vdi
  * @returns {number[][]}
  */
@@ -204,7 +205,7 @@ class SlopeFinder {
   }
 
   /**
-   * Where a ray of V_O's picture enters and leaves the box.
+   * The depths and faces at which a ray of V_O's picture enters and leaves the box.
    * @param {number} x in lists from the lower left corner
    * @param {number} y
    */
@@ -257,7 +258,7 @@ class SlopeFinder {
   }
 
   /**
-   * The ends of a supersegment all over its list's pixel and half a pixel around it, where rays are
+   * The ends of a supersegment over its list's pixel and half a pixel around it, where rays are
    * intersected with the list (expand.comp).
    * @param {number} i
    * @param {number} list
@@ -303,7 +304,8 @@ class SlopeFinder {
 }
 
 /**
- * Where a ray of V_O's picture passes through a face, and how fast: distance from it per depth.
+ * The depth at which a ray of V_O's picture passes through a face, and the rate: distance from the
+ * face per depth.
  * @param {number[]} face
  * @param {number[]} plane x and y of the ray in the image plane
  * @param {boolean} parallel

@@ -97,7 +97,7 @@ export class SteerPanel {
     this.asked = "";
     /** Ends of the colours' range that the user has edited since the fields last showed the range in force. */
     this.edited = new Set();
-    /** Whether the edited range can't be asked for yet: its ends don't ascend. */
+    /** Whether the edited range can't be requested yet, because its ends don't ascend. */
     this.isUnsent = false;
     partOf("drive").addEventListener("click", () => this.isMine() ? live.release() : live.drive());
     partOf("newview").addEventListener("click", () => this.askForView());
@@ -141,7 +141,7 @@ export class SteerPanel {
     if (this.isMine()) this.live.steer(wish);
   }
 
-  /** Asks for the edited range. The other end stays as it is in force. */
+  /** Requests the edited range. An unedited end keeps its value in force. */
   askForRange() {
     const range = this.live.steering?.generator?.range;
     if (!range) return;
@@ -153,7 +153,7 @@ export class SteerPanel {
   }
 
   /**
-   * Shows the range in force, unless the user is at work on another one.
+   * Shows the range in force, unless the user is editing it.
    * @param {[number, number]} range
    */
   showRange(range) {
@@ -174,7 +174,7 @@ export class SteerPanel {
     this.ask({camera: wishedCamera(camera)});
   }
 
-  /** Called when the view has rested. */
+  /** Call when the view has come to rest. */
   onRest() {
     const camera = this.view.camera();
     if (!camera || !fieldOf("auto").checked || cameraText(camera) === this.asked) return;

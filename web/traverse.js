@@ -473,7 +473,7 @@ uniform float pixelSize;
 uniform float nearest;
 uniform float farthest;
 uniform float binScale;
-uniform vec2 code;             // depth of code c: code.x + c * code.y; 0 and 1 where supersegments have depths
+uniform vec2 code;             // depth of code c: code.x + c * code.y; (0, 1) if supersegments have depths
 uniform vec3 rayOrigin[3];     // at the picture's middle, and its change per pixel to the right and up
 uniform vec3 rayDirection[3];
 uniform vec2 pictureSize;      // in pixels of the canvas

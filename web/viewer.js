@@ -173,7 +173,7 @@ export class Viewer {
     this.schedule();
   }
 
-  /** Whether there will be a sheared picture instead of the present one. */
+  /** Whether a sheared picture will replace the present one. */
   awaitsLeaning() {
     const {loaded, smooth} = this.renderer;
     return smooth && loaded !== undefined && !this.renderer.canShear() && !this.unleanable.has(loaded.vdi);
@@ -188,7 +188,7 @@ export class Viewer {
     try {
       vdi.leaning ??= await this.lean(vdi);
       if (renderer.loaded?.vdi === vdi) await renderer.setLeaning(politely());
-      // From its first row on, even if a smooth picture is drawn in part.
+      // Begins at the first row, even if a smooth picture is drawn in part.
       if (renderer.canShear() && this.missing !== "all") [this.missing, this.nextRow] = ["detail", 0];
     } catch {
       this.unleanable.add(vdi);  // its smooth picture stays
@@ -258,7 +258,7 @@ export class Viewer {
     renderer.drawPicture(this.camera, 1, 0, canvas.height, renderer.canShear());
     renderer.finishPicture();
     this.refresh();
-    // Strips would go on in the former picture, of which they would leave the first rows as they are.
+    // Otherwise strips would go on in the former picture, without redrawing its first rows.
     this.nextRow = 0;
     this.missing = "nothing";
     this.awaitRest();
