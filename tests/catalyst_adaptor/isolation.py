@@ -16,6 +16,8 @@ SMALL = {"field": "T", "resolution": [40, 30], "colors": {"range": [0, 1]}, "iso
 RANKS = int(simulation[simulation.index("-n") + 1]) if "-n" in simulation else 1
 LAST = RANKS - 1
 PATIENCE = 250
+# A sanitizer's library, which must be the first.
+PRELOADED = "".join(library + ":" for library in os.environ.get("LD_PRELOAD", "").split(":") if library)
 ENGINE = 2
 SCRIPT = 3
 
@@ -58,7 +60,8 @@ class Run:
 
 
 def dying(stage, how="kill", rank=LAST, **environment):
-    return {"LD_PRELOAD": preload + ":libvulkan.so.1", "VDI_TEST_DIE": "%s:%d:%s" % (stage, rank, how), **environment}
+    return {"LD_PRELOAD": PRELOADED + preload + ":libvulkan.so.1", "VDI_TEST_DIE": "%s:%d:%s" % (stage, rank, how),
+            **environment}
 
 
 def made():

@@ -12,6 +12,8 @@ import tempfile
 case, tool, *simulation = sys.argv[1:]
 SMALL = {"field": "V", "resolution": [40, 30]}
 PATIENCE = 200
+# A sanitizer's library, which must be the first.
+PRELOADED = "".join(library + ":" for library in os.environ.get("LD_PRELOAD", "").split(":") if library)
 
 
 def run(document, *codes, said="", **environment):
@@ -218,8 +220,8 @@ def lost_device():
     def lose(output, *codes, **environment):
         open("lose", "w").close()
         run({**document, "output": output + "_{timestep}.vdi", "existing": "continue"}, *codes,
-            LD_PRELOAD=os.environ["VDI_TEST_PRELOAD"] + ":libvulkan.so.1", VDI_TEST_LOSE_DEVICE=os.path.abspath("lose"),
-            **environment)
+            LD_PRELOAD=PRELOADED + os.environ["VDI_TEST_PRELOAD"] + ":libvulkan.so.1",
+            VDI_TEST_LOSE_DEVICE=os.path.abspath("lose"), **environment)
         assert not os.path.exists("lose"), "no device was lost"
 
     lose("two", 0)
