@@ -23,8 +23,8 @@ namespace {
 constexpr std::array<std::pair<const char*, std::size_t>, 8> scalarTypes{
     {{"u8", 1}, {"i8", 1}, {"u16", 2}, {"i16", 2}, {"u32", 4}, {"i32", 4}, {"f32", 4}, {"f64", 8}}};
 
-/// Written so that compilers vectorise it. This runs for every value of every step; a loop with a branch and
-/// one pair of bounds would take several times as long as the upload.
+/// This loop is written so that compilers vectorise it. It runs for every value of every step; a loop with a
+/// branch and one pair of bounds would take several times as long as the upload.
 template <typename T>
 ScalarRange finiteRangeOf(std::span<const T> values) {
   using Limits = std::numeric_limits<T>;
@@ -165,7 +165,7 @@ ScalarRange finiteRangeOf(ScalarType type, const void* data, std::size_t count) 
   });
 }
 
-/// The range of stored values that are no array, tile by tile.
+/// The range of strided or computed values, read tile by tile.
 ScalarRange finiteRangeOfTiles(const Block& block) {
   const Tiling tiles = block.tilesOf(block.stored());
   constexpr std::size_t minimum = 64;
@@ -243,7 +243,7 @@ void validate(std::span<const Block> blocks) {
                               block.dims.y, block.dims.z),
                   context);
     }
-    // Values computed in single precision need a distance from its limits.
+    // These bounds leave headroom for computations in single precision.
     constexpr double minSpacing = 1e-30;
     constexpr double maxSpacing = 1e30;
     if (!isFinite(block.spacing) || glm::any(glm::lessThan(block.spacing, glm::dvec3(minSpacing))) ||
@@ -265,8 +265,8 @@ void validate(std::span<const Block> blocks) {
       throw Error(
           ErrorCode::InvalidArgument,
           fmt::format(
-              "it lies at ({}, {}, {}) with a spacing of ({}, {}, {}): more than {} spacings from "
-              "the origin of the world, positions can't be told apart; choose an origin near the data",
+              "it lies at ({}, {}, {}) with a spacing of ({}, {}, {}); positions more than {} spacings from "
+              "the origin of the world can't be told apart; choose an origin near the data",
               block.origin.x, block.origin.y, block.origin.z, block.spacing.x, block.spacing.y,
               block.spacing.z, farthest),
           context);

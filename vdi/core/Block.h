@@ -27,7 +27,7 @@ struct GhostLayers {
 
 /// Values that extend the stored ones or replace some of them.
 struct Patch {
-  IndexBox box;  // indices: 0 is the first stored value; may start below it and end beyond dims
+  IndexBox box;  // indices relative to the first stored value; may reach outside [0, dims)
   std::shared_ptr<const void> values;  // [size.z][size.y][size.x], x fastest, of the block's scalar type
 };
 
@@ -56,8 +56,8 @@ class ComputedValues {
 ///
 /// Several blocks may share data, each owning a part of it; then they share extra and patches too.
 ///
-/// Stored values are an array, packed at `data`, unless `strides` or `computed` is set, which excludes the
-/// other. Readers call copyTo, which treats all three alike, or take the array if isPacked says so.
+/// Stored values are an array packed at `data`, unless either `strides` or `computed` is set; they are never
+/// both set. Readers call copyTo, which handles all three cases, or read the array if isPacked returns true.
 ///
 /// Ownership of memory: the core reads `data` and never copies it on the host. `keepAlive`, if set, owns it.
 struct Block {
@@ -78,7 +78,7 @@ struct Block {
   std::shared_ptr<const std::vector<IndexBox>> masked{};
   std::optional<ByteStrides> strides{};  // where the values lie from `data` on; any alignment
   std::shared_ptr<const ComputedValues> computed{};
-  /// Distance, in spacings, of the values from points or the middles of cells. `origin` includes it.
+  /// Offset of the values, in spacings, from the grid's points or cell centres. `origin` includes it.
   glm::dvec3 offset{0.0};
 
   IndexBox stored() const { return {glm::ivec3(0), dims}; }
@@ -99,7 +99,7 @@ struct Block {
   /// Copies the stored values of a box within stored(), [size.z][size.y][size.x], to memory that is aligned
   /// for them.
   void copyTo(const IndexBox& box, void* to) const;
-  /// Tiles of a box: as large as copyTo should copy at a time, to a buffer that is reused.
+  /// Divides a box into tiles that copyTo can copy one by one into a reused buffer that fits the cache.
   Tiling tilesOf(const IndexBox& box) const;
 
   /// Point data: `origin` is the position of the first stored point. The block owns the volume from the first

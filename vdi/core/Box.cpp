@@ -51,7 +51,8 @@ std::vector<IndexBox> coverWithBoxes(const glm::ivec3& size, std::vector<bool> o
 
 namespace {
 
-/// The holes' faces cut the box into a lattice of cells, each wholly inside or outside the holes.
+/// Limit on the cells of one lattice. The holes' faces cut the box into cells, each wholly inside or outside
+/// the holes.
 constexpr std::size_t maxCells = std::size_t{1} << 22;
 
 std::vector<Box> cut(const Box& box, const std::vector<Box>& holes) {

@@ -57,8 +57,8 @@ struct IndexBox {
   }
 };
 
-/// Calls visit(part) for the part of `box` outside `hole`, as at most six disjoint boxes. Those below and
-/// above it in z are whole slices. Works for Box and IndexBox.
+/// Calls visit(part) for the part of `box` outside `hole`, as at most six disjoint boxes. The parts below and
+/// above `hole` in z are whole slices. Works for Box and IndexBox.
 template <typename AnyBox, typename Visit>
 void forEachPartWithout(const AnyBox& box, const AnyBox& hole, Visit visit) {
   const AnyBox common = box.intersection(hole);

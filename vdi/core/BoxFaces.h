@@ -14,8 +14,8 @@ namespace vdi {
 using BoxFaces = std::array<glm::dvec4, 6>;
 BoxFaces facesOf(const Box& box, const View& view);
 
-/// How far a list's end may lie from the face on which it ends, for rounding: `depth` along the view's axis,
-/// and `distance` from the face.
+/// The largest rounding error of a list's end, which lies on a face: `depth` along the view's axis, and
+/// `distance` from the face.
 struct FaceTolerance {
   double depth = 0.0;
   double distance = 0.0;

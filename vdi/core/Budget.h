@@ -11,7 +11,8 @@ namespace vdi {
 
 enum class Budget : std::uint32_t {
   List = 0,  // up to N_S each, as in the paper
-  /// All lists together hold as many as with N_S each. Complex lists get more, up to maxPerList, others less.
+  /// All lists together hold as many as with N_S each. Complex lists get more, up to maxPerList, others
+  /// fewer.
   Total = 1,
 };
 
@@ -28,8 +29,8 @@ constexpr std::uint32_t maxPerList(std::uint32_t supersegments, Budget budget) {
 
 /// The demand of all lists, counted before Budget::Total allocates: the number of supersegments that they
 /// would have at each of several levels of coarseness. Level 0 keeps every sample, the last level leaves one
-/// supersegment a list, and those between are the tolerances of merging (vdi/reference/Segmenter.h).
-/// Histograms of parts of a picture add up.
+/// supersegment per list, and the levels between are the tolerances of merging (vdi/reference/Segmenter.h).
+/// The histogram of a picture is the sum of those of its parts.
 struct SupersegmentHistogram {
   static constexpr std::size_t levels = 10;
   std::array<std::uint64_t, levels> supersegments{};  // each list limited to maxPerList
@@ -41,13 +42,13 @@ struct SupersegmentHistogram {
     return *this;
   }
 
-  /// The level, fractions included, at which there are `fill` times as many supersegments as `equally`.
-  /// Between two levels each list's number is interpolated.
+  /// The fractional level at which there are `fill` times as many supersegments as `equally`. Counts are
+  /// interpolated between two levels.
   float levelFor(double fill) const;
 };
 
-/// Offset in [0, 1) that a list's number gets before it is rounded down. Without it, similar lists would all
-/// round the same way, and their sum would be off. `index` is the list's.
+/// Offset in [0, 1) that is added to the number of supersegments of list `index` before rounding down.
+/// Without it, similar lists would all round the same way, and their sum would be off.
 constexpr float roundingOf(std::uint32_t index) {
   return static_cast<float>((index * 0x9E3779B1U) >> 8U) * 0x1p-24F;
 }

@@ -23,10 +23,10 @@ struct Camera {
 
   bool operator==(const Camera&) const = default;
 
-  /// The camera turned by `degrees` about the focal point, around view-up as it is set, whatever its length;
-  /// positive moves the camera to its own right. View-up stays. As vtkCamera::Azimuth does, this keeps the
-  /// distance along view-up, and a camera that looks along view-up stays in place. Like vtkCamera, it
-  /// replaces a view-up of zero by (0, 1, 0).
+  /// The camera turned by `degrees` about the focal point, around view-up as set, of any length; positive
+  /// moves the camera to its own right. View-up stays. As vtkCamera::Azimuth does, this keeps the distance
+  /// along view-up, and a camera that looks along view-up stays in place. Like vtkCamera, it replaces a
+  /// view-up of zero by (0, 1, 0).
   Camera azimuth(double degrees) const;
 
   /// A camera looking along `direction` at the whole of `bounds`, as vtkRenderer::ResetCamera places it.
@@ -40,7 +40,7 @@ struct Ray {
 };
 
 /// The part of the image plane that a picture shows: view-space x and y of its lower left and upper right
-/// corner, at depth 1 (perspective) or anywhere (parallel).
+/// corner, at depth 1 (perspective) or any depth (parallel).
 struct ImagePlane {
   glm::dvec2 low{-1.0};
   glm::dvec2 high{1.0};
@@ -76,7 +76,7 @@ class View {
   const glm::dvec3& up() const { return up_; }            // world, unit
   const glm::dvec3& forward() const { return forward_; }  // world, unit: the axis of depth
 
-  /// Half the height of the image plane: at depth 1 (perspective) or anywhere (parallel), in world units.
+  /// Half the height of the image plane, at depth 1 (perspective) or any depth (parallel), in world units.
   double halfHeight() const { return halfHeight_; }
   double halfWidth() const { return halfWidth_; }
   /// View-space x and y of the image plane's middle, at the same depth: 0 unless a plane was set.

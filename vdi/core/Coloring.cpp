@@ -32,7 +32,7 @@ OpacityNode between(const OpacityNode& a, const OpacityNode& b, double share) {
   return {0.0, glm::mix(a.opacity, b.opacity, share)};
 }
 
-/// The fewest nodes found from which linear interpolation gives all others to within `tolerance`, by the
+/// A small set of nodes from which linear interpolation gives all others to within `tolerance`, by the
 /// algorithm of Ramer, Douglas and Peucker with errors measured in values.
 template <typename Node>
 std::vector<Node> withFewer(const std::vector<Node>& nodes, double tolerance) {
@@ -69,7 +69,7 @@ template <typename Node>
 std::vector<Node> withAtMost(const std::vector<Node>& nodes, double tolerance) {
   std::vector<Node> few = withFewer(nodes, tolerance);
   for (; few.size() > mostNodes && tolerance < 1.0; tolerance *= 2.0) few = withFewer(nodes, 2.0 * tolerance);
-  if (few.size() > mostNodes) few.resize(mostNodes);  // nodes at one place, of which two count
+  if (few.size() > mostNodes) few.resize(mostNodes);  // these are nodes at one place, of which only two count
   return few;
 }
 

@@ -28,7 +28,7 @@ double load(const void* data, std::size_t index) {
   return static_cast<double>(value);
 }
 
-/// Computes doubles of components, a tile at a time.
+/// Computes magnitudes, phases and 64-bit components as doubles, a tile at a time.
 class Computation : public ComputedValues {
  public:
   Computation(const ComponentArray& array, int component) : array_(array), component_(component) {}

@@ -11,7 +11,7 @@
 
 namespace vdi {
 
-/// Closes a descriptor. -1: none.
+/// Owns a descriptor and closes it. The number -1 means none.
 class Descriptor {
  public:
   Descriptor() = default;
@@ -27,7 +27,8 @@ class Descriptor {
   int number() const { return number_; }
   bool isOpen() const { return number_ >= 0; }
   int release() { return std::exchange(number_, -1); }
-  /// Closes it now, and returns close's result: some file systems report only there that the disk is full.
+  /// Closes the descriptor now and returns the result of close(): some file systems report a full disk only
+  /// then.
   int close() { return ::close(release()); }
 
  private:

@@ -1,5 +1,6 @@
-// The encodings of supersegments: the types in which they lie in memory, travel and are stored, and what the
-// rest of the library asks about each. docs/architecture.md lists the other places of an encoding.
+// The encodings of supersegments: the types that hold them in memory, between ranks and in files, and the
+// facts about each that the rest of the library needs. docs/architecture.md lists the other code that depends
+// on an encoding.
 #pragma once
 
 #include <cassert>
@@ -29,14 +30,14 @@ template <>
 struct EncodingOf<CompactSupersegment> {
   static constexpr Precision precision = Precision::Compact;
   static constexpr bool hasDepthCode = true;
-  static constexpr std::size_t chunkBytes = 9;  // two for each depth and the optical depth, one a channel
+  static constexpr std::size_t chunkBytes = 9;  // two each for depths and optical depth, one per channel
   static constexpr double typicalFileBytes = 5.5;
 };
 
-/// Lists in any encoding. The index of the type in force is the encoding's number.
+/// Lists in any encoding. The index of the active alternative is the encoding's number.
 using AnyLists = std::variant<SupersegmentLists, CompactLists>;
 
-/// Instantiates a template for the types of all encodings: `instantiate` is a macro of the type.
+/// Instantiates a template for the types of all encodings: `instantiate` is a macro that takes the type.
 #define VDI_EACH_ENCODING(instantiate) instantiate(Supersegment) instantiate(CompactSupersegment)
 
 namespace detail {
@@ -102,7 +103,7 @@ constexpr std::uint64_t chunkBytes(std::uint64_t lists, std::uint64_t supersegme
   });
 }
 
-/// No lists, in that encoding.
+/// An empty ListsOf in that encoding.
 inline AnyLists noLists(Precision precision) {
   return withSegment(precision, []<typename Segment>() { return AnyLists(ListsOf<Segment>()); });
 }

@@ -16,14 +16,15 @@ struct EnvironmentVariable {
   bool forUsers;        // false: for tests and measurements
 };
 
-/// All variables, by name. The user guide's table lists them, too; `vdi --help` lists those with forUsers.
+/// All variables, sorted by name. The user guide's table lists them, too; `vdi --help` lists those with
+/// forUsers.
 std::span<const EnvironmentVariable> environmentVariables();
 
 /// The value of a variable in the table; nullopt if it is unset or empty.
 std::optional<std::string> environmentText(const char* name);
 
-/// The value as a whole number, `least` or more. `text`, where it is given, replaces the environment's value,
-/// say with another rank's. Throws Error{InvalidArgument} that names the variable and its valid values.
+/// The value as a whole number, `least` or more. `text`, if given, replaces this environment's value, for
+/// example by another rank's. Throws Error{InvalidArgument} that names the variable and its valid values.
 std::optional<std::uint32_t> environmentCount(const char* name, std::uint32_t least);
 std::optional<std::uint32_t> environmentCount(const char* name, std::uint32_t least, std::string_view text);
 

@@ -11,12 +11,12 @@ namespace vdi {
 enum class ErrorCode {
   InvalidArgument,    // the caller passed an unusable value, such as N_S = 0 or a mismatch between ranks
   DeviceUnavailable,  // no Vulkan device fits; the message lists every device and why it was refused
-  OutOfMemory,        // the device or the host cannot hold the data; the message has the figure
+  OutOfMemory,        // the device or the host cannot hold the data; the message gives the sizes
   DeviceFailure,      // a Vulkan call failed
   Io,                 // a file cannot be opened, read or written
   Format,             // the bytes of a file or message violate the format
   Communication,      // an MPI call failed
-  RemoteRank,         // another rank failed, this one did not; the message carries that rank's text
+  RemoteRank,         // another rank failed, but not this one; the message carries that rank's text
   Cancelled,          // the progress callback asked to stop
 };
 

@@ -40,8 +40,8 @@ constexpr double typicalFill = 0.15;
 
 /// Estimates a VDI. If `last` is a VDI of the same volume and transfer function, its supersegments are scaled
 /// with the numbers of lists and N_S; otherwise lists hold typicalFill. The time for casting scales with the
-/// samples, the rest with the supersegments. There is no time without `last`, nor for another algorithm or
-/// budget. The estimate ignores the viewpoint.
+/// samples, the rest with the supersegments. `seconds` is empty without `last`, or if `last` has another
+/// algorithm or budget. The estimate ignores the viewpoint.
 VdiEstimate estimateOf(const GenerateSettings& settings, const std::optional<MadeVdi>& last);
 
 }  // namespace vdi

@@ -1,4 +1,4 @@
-// Whether vectors are finite.
+// A test for finite vectors.
 #pragma once
 
 #include <cmath>

@@ -32,18 +32,18 @@ constexpr double automaticRate = 0.0;
 struct GenerateSettings {
   int width = 1280;
   int height = 720;
-  /// [0, maxMargin]: the share of the picture's width for which the VDI has lists beyond the left and the
-  /// right edge, and of its height beyond the lower and the upper one. marginOf (Margin.h) limits it to the
-  /// visible scene.
+  /// Extent of the margin in [0, maxMargin]: beyond the left and right edges as a share of the picture's
+  /// width, and beyond the lower and upper edges as a share of its height. marginOf (Margin.h) limits it to
+  /// the visible scene.
   double margin = 0.0;
   std::uint32_t supersegments = 25;  // N_S, 1 .. maxSupersegments
   /// Total: lists have N_S on average, if they have that many samples; needs Algorithm::Merge.
   Budget budget = Budget::List;
-  double fill = 1.0;  // (0, 1]; with Budget::Total, the made share of the supersegments that N_S each gives
+  double fill = 1.0;  // (0, 1]; with Budget::Total, the share to make of N_S supersegments per list
   /// [1/64, 64]; or automaticRate: 1, 2 or 4, as the transfer function needs on the volume (SamplingRate.h).
   double samplesPerVoxel = 1.0;
   Algorithm algorithm = Algorithm::Merge;
-  /// If rays have more samples than depthCodeFor can number, the VDI has full precision all the same.
+  /// If rays have more samples than depthCodeFor can number, the VDI has full precision regardless.
   Precision precision = Precision::Compact;
   /// A ray ends once it has accumulated this opacity: (0, 1]; 1 never ends early. Material that such a ray
   /// leaves out at V_O is missing when seen from V_N, hence the default (docs/adr). Pictures need no more

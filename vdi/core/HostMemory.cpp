@@ -22,7 +22,7 @@ namespace vdi {
 
 namespace {
 
-/// A page size that every Linux maps, and that devices import.
+/// A multiple of Linux's usual page sizes, at which devices can import memory.
 constexpr std::uint64_t page = 65536;
 
 std::uint64_t wholePages(std::uint64_t bytes) {
@@ -44,7 +44,8 @@ std::span<std::byte> map(std::uint64_t size, int flags, int descriptor, const ch
 const std::string folder = "/dev/shm";
 constexpr std::string_view prefix = "/pv-vdi-";
 
-/// Unlinks memory of processes that were killed before they could. A process locks its memory while it lives.
+/// Unlinks the memory of processes that were killed before they unlinked it. A live process holds a lock on
+/// its memory.
 void removeNamesOfTheDead() {
   std::error_code unreadable;
   using Iterator = std::filesystem::directory_iterator;
@@ -56,7 +57,7 @@ void removeNamesOfTheDead() {
   }
 }
 
-/// A name that no other process of the host uses, in whatever container.
+/// A name that no other process of the host uses, in any container.
 std::string newName() {
   static std::atomic<std::uint32_t> made{0};
   static const std::uint64_t process = (std::uint64_t{std::random_device()()} << 32) | std::random_device()();
@@ -96,9 +97,9 @@ std::shared_ptr<HostMemory> HostMemory::shared(std::uint64_t bytes) {
 bool HostMemory::publish() {
   if (linked_) return true;
   if (descriptor_ < 0) return false;
-  static std::atomic<pid_t> remover{0};  // a forked process also does it
+  static std::atomic<pid_t> remover{0};  // a process id, so that a forked process removes names, too
   if (remover.exchange(getpid()) != getpid()) removeNamesOfTheDead();
-  // Locked before it has a name: a process that finds it unlocked knows that this one has ended.
+  // Lock the memory before naming it: another process that finds it unlocked takes this one to have ended.
   if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) return false;
   const std::string self = fmt::format("/proc/self/fd/{}", descriptor_);
   linked_ = linkat(AT_FDCWD, self.c_str(), AT_FDCWD, (folder + name_).c_str(), AT_SYMLINK_FOLLOW) == 0;

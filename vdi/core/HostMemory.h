@@ -33,7 +33,7 @@ class HostMemory {
   std::span<std::byte> bytes() const { return bytes_; }  // at least as many as requested
   /// Unique on this host for all time; empty if other processes cannot open the memory.
   const std::string& name() const { return name_; }
-  /// Lets other processes open the memory from now on; returns whether they can. Call just before they do,
+  /// Lets other processes open the memory from now on; returns whether they can. Call it just before they do,
   /// since a process that is killed in between leaves the name and the memory behind. The first call in a
   /// process removes the leftovers of dead processes. Does nothing and returns false after unlink, and for
   /// memory that is not shareable.

@@ -18,8 +18,7 @@ struct Image {
   int height = 0;
   HostVector<glm::vec4> rgba;  // [height][width], premultiplied
   /// [height][width]: view-space depth of the front of the first sample or supersegment that is not
-  /// transparent, world units; noDepth where every one is transparent. May be empty if no depth was
-  /// requested.
+  /// transparent, world units; noDepth where all are transparent. May be empty if no depth was requested.
   HostVector<float> depth;
 
   static constexpr float noDepth = std::numeric_limits<float>::infinity();
@@ -40,8 +39,8 @@ struct ImageBytes {
 /// Whether colours are multiplied by their opacity or straight.
 enum class Alpha { Premultiplied, Straight };
 
-/// The nearest 8-bit code of a share in [0, 1], clamped; 0 for NaN. Rounds as std::lround, whose call for
-/// each value takes four times as long.
+/// The nearest 8-bit code of a share in [0, 1], clamped; 0 for NaN. Rounds as std::lround does, which would
+/// take four times as long.
 inline std::uint8_t toByte(float share) {
   if (!(share > 0.0F)) return 0;
   const float code = std::min(share, 1.0F) * 255.0F;

@@ -1,4 +1,4 @@
-// How similar two pictures are.
+// Measures of the similarity of two pictures.
 #pragma once
 
 #include <cstdint>

@@ -10,12 +10,13 @@
 
 namespace vdi {
 
-/// The number of lists on the left and on the right of the picture (x), below and above it (y): the settings'
+/// The number of lists on each side of the picture, left and right (x), below and above (y): the settings'
 /// share of the picture, rounded up, but no more than
 ///   * the extent of the scene's box in the image plane, so that a scene wholly in the picture has no margin;
-///   * the largest for which samples are slabs if the picture's are (samplesAreSlabs); otherwise the picture
-///     would change.
-/// It depends only on its arguments, so all ranks get the same margin. Throws as View and depthLattice do.
+///   * the largest margin for which samples are slabs, if the picture's samples are slabs (samplesAreSlabs);
+///     a larger one would change the picture.
+/// The result depends only on the arguments, so all ranks get the same margin. Throws as View and
+/// depthLattice do.
 glm::ivec2 marginOf(const Scene& scene, const Camera& camera, const GenerateSettings& settings);
 
 /// The view of all lists that the settings ask for: the picture and its margin.

@@ -6,8 +6,8 @@
 
 namespace vdi {
 
-/// For an element's text and for attributes in double quotes. Control characters, which XML lacks, become
-/// spaces.
+/// Escapes the text of elements and of attributes in double quotes. Control characters, which XML lacks,
+/// become spaces.
 inline std::string escaped(std::string_view text) {
   std::string out;
   for (const char c : text) {

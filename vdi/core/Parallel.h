@@ -16,13 +16,13 @@ namespace vdi {
 /// threads would only slow each other down.
 std::size_t usableCores();
 
-/// More threads than these only wait for the host's memory.
+/// The most threads to use: more would only wait for the host's memory.
 inline constexpr std::size_t mostThreads = 16;
 
 /// Calls work(first, last) for ranges that make up [0, count), on several threads at once if each gets at
 /// least `minimum` elements. Choose `minimum` so that it takes some 100 us: starting a thread takes half of
-/// that. Returns when all work is done, and rethrows an exception of `work`. Where no thread can be started,
-/// the calling one does its part.
+/// that. Returns when all work is done, and rethrows an exception of `work`. If a thread can't be started,
+/// the calling thread does its work.
 template <typename Work>
 void inParallel(std::size_t count, std::size_t minimum, Work work) {
   const std::size_t threads =
@@ -37,8 +37,8 @@ void inParallel(std::size_t count, std::size_t minimum, Work work) {
   for (std::future<void>& other : others) other.get();
 }
 
-/// Calls work(index) for each of [0, count), on several threads, each of which takes the next index when it
-/// is done with one: for elements that take very different times. Otherwise as inParallel.
+/// Calls work(index) for each of [0, count) on several threads. Each thread takes the next index when it has
+/// finished one, which suits elements that take very different times. Otherwise like inParallel.
 template <typename Work>
 void eachInParallel(std::size_t count, Work work) {
   std::atomic<std::size_t> next{0};
@@ -47,7 +47,7 @@ void eachInParallel(std::size_t count, Work work) {
   });
 }
 
-/// Copies on several threads: one core copies about 10 GB/s.
+/// Copies on several threads, since one core copies only about 10 GB/s.
 inline void copyInParallel(std::span<const std::byte> from, void* to) {
   inParallel(from.size(), std::size_t{1} << 20, [&](std::size_t first, std::size_t last) {
     std::memcpy(static_cast<std::byte*>(to) + first, from.data() + first, last - first);

@@ -6,8 +6,8 @@
 //   position. A cell gets the share of the box that lies in it. In cells of the block's own lattice these are
 //   the products of linear weights.
 // - SPH: the cubic spline M4 with support 2 h in three dimensions (Monaghan 1992, Annu. Rev. Astron.
-//   Astrophys. 30, 543), taken at the centres of cells. Cells larger than the owner's are divided into equal
-//   parts of about its size first, and get the mean of the parts.
+//   Astrophys. 30, 543), taken at the centres of cells. Cells larger than the owner's are first divided into
+//   equal parts of about the size of the owner's cells, and get the mean of the parts.
 //
 // A particle's shares are divided by their sum over all owned cells of all blocks, so none of its weight is
 // lost at the domain's faces, between levels, or by coarse sampling of the kernel.
@@ -21,7 +21,7 @@
 namespace vdi {
 
 /// Numbers `stride` bytes apart, of f32 or f64 in native byte order, not necessarily aligned. A stride of 0
-/// makes all of them the first one.
+/// repeats the first number.
 struct NumberColumn {
   const std::byte* first = nullptr;
   std::int64_t stride = 0;
@@ -49,7 +49,7 @@ struct Particles {
   NumberColumn lengths;                   // smoothing lengths h in the world; null: cloud in cell for all
 };
 
-/// The value of a cell: the weight in it, or that divided by its volume.
+/// The value of a cell: the weight in it, or this weight divided by the cell's volume.
 enum class DepositKind { Sum, Density };
 
 /// Numbers of particles.
@@ -62,13 +62,13 @@ struct ParticleCounts {
 };
 
 /// The kernel is used if h is at least this many times the largest edge of the owner's cells, and cloud in
-/// cell below. Both spread equally wide there: their standard deviations along an axis, sqrt(1/6) cells and
-/// 0.5477 h, agree at 0.745. A shorter kernel could miss the centres of all cells.
+/// cell below. At that length both spread about equally wide: their standard deviations along an axis,
+/// sqrt(1/6) cells and 0.5477 h, agree at 0.745. A shorter kernel could miss the centres of all cells.
 inline constexpr double shortestKernel = 0.75;
 
 /// A kernel is replaced by cloud in cell if its shares add up to less than this times the share that a cell
-/// of the owner's size would get at the kernel's centre. This happens only where the owner's cell is owned in
-/// small part, and no other centre is near.
+/// of the owner's size would get at the kernel's centre. This happens only where the owner owns a small part
+/// of its cell, and no other centre is near.
 inline constexpr double leastKernelSum = 1.0 / 16.0;
 
 /// A larger cell is divided into at most this many parts per axis.

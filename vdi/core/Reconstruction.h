@@ -8,12 +8,13 @@ namespace vdi {
 
 enum class Reconstruction : std::uint32_t {
   Constant = 0,  // a list fills the frustum of its pixel, as in the paper (section 2.4)
-  /// At each column of V_O's picture that a ray crosses (or row, if it crosses more of these), it blends two
-  /// lists by its distance from their centres. V_O's own picture is the same. More accurate, but reads more.
+  /// At each column of V_O's picture that a ray crosses (or row, if it crosses more rows), rendering blends
+  /// two lists by the ray's distance from their centres. V_O's own picture is the same as with Constant. More
+  /// accurate, but reads more.
   Smooth = 1,
-  /// Smooth, and the faces of supersegments lean as the lists around them suggest (vdi/reference/Slopes.h).
-  /// Surfaces keep their place between lists. V_O's own picture is the same. Most accurate, and takes
-  /// longest.
+  /// Like Smooth, but the faces of supersegments slope as the lists around them suggest
+  /// (vdi/reference/Slopes.h), so that surfaces keep their place between lists. V_O's own picture is the
+  /// same. The most accurate and slowest.
   Sheared = 2,
 };
 

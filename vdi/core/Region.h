@@ -19,8 +19,8 @@ struct ClipPlane {
 
 inline constexpr std::size_t maxClipPlanes = 6;
 
-/// The samples that count. They end exactly at the region's faces. Values beyond still take part in
-/// interpolation and gradients, so faces show the volume's interior as it is.
+/// The part of the volume whose samples count. Samples end exactly at its faces. Values beyond still take
+/// part in interpolation and gradients, so faces show the volume's interior as it is.
 struct Region {
   std::optional<Box> box;         // world; none: the whole scene
   std::vector<ClipPlane> planes;  // at most maxClipPlanes; a point must satisfy all of them

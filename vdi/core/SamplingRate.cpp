@@ -19,7 +19,7 @@ constexpr std::size_t probeCount = 8192;
 /// bound, the picture's SSIM to a converged one may fall below 0.997
 /// (docs/adr/steep-functions-get-more-samples.md).
 constexpr double tolerance = 1e-4;
-/// Larger errors of a sample count as this: a few large ones are less visible than many small ones.
+/// Upper limit for the error of a sample, because a few large errors are less visible than many small ones.
 constexpr double largestError = 0.05;
 
 /// A point of an additive sequence that fills the unit cube evenly (M. Roberts, The Unreasonable
@@ -120,7 +120,7 @@ SlabError errorOf(const SlabIntegral& slabs, const std::array<double, 3>& positi
   return {largest * largest, halves.a};
 }
 
-/// Whether slabs show enough at this rate: at 1, whole probes; at 2, slabs half as long in their middles.
+/// Whether slabs show enough at this rate. Rate 1 tests whole probes, rate 2 the middle half of each probe.
 bool showsEnough(const TransferTable& table, const SlabIntegral& slabs, double minSpacing,
                  std::span<const Probe> probes, double rate) {
   std::vector<SlabError> errors(probes.size());
@@ -148,7 +148,8 @@ bool showsEnough(const TransferTable& table, const SlabIntegral& slabs, double m
 
 std::vector<Probe> probesOf(const Scene& scene, std::span<const Block> blocks) {
   if (scene.bounds.empty() || !(scene.minSpacing > 0.0)) return {};
-  std::vector<std::pair<Place, std::size_t>> places;  // by x: a block only searches those between its faces
+  // Sorted by x, so that a block searches only the places between its faces.
+  std::vector<std::pair<Place, std::size_t>> places;
   places.reserve(probeCount);
   for (std::size_t index = 0; index < probeCount; ++index) places.emplace_back(placeOf(scene, index), index);
   const auto isBefore = [](const auto& a, const auto& b) { return a.first.center.x < b.first.center.x; };
@@ -161,7 +162,7 @@ std::vector<Probe> probesOf(const Scene& scene, std::span<const Block> blocks) {
   std::vector<Owned> owned;
   for (const Block& block : blocks) {
     if (block.owned.empty()) continue;
-    // More than the distance by which snapping moves a face.
+    // A margin wider than the distance by which snapping moves a face.
     const double spare = 1e-5 * scene.bounds.size().x;
     const auto at = [&](double x) {
       return std::pair(Place{glm::dvec3(x - scene.bounds.center().x, 0.0, 0.0), {}}, std::size_t{0});
@@ -173,7 +174,7 @@ std::vector<Probe> probesOf(const Scene& scene, std::span<const Block> blocks) {
     }
   }
   std::ranges::sort(owned, {}, &Owned::index);
-  // This takes time in each step of a simulation, whatever the rate.
+  // Probes take time in each step of a simulation, regardless of the rate.
   std::vector<Probe> probes(owned.size());
   inParallel(owned.size(), 256, [&](std::size_t first, std::size_t last) {
     for (std::size_t i = first; i < last; ++i)

@@ -58,7 +58,7 @@ DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPe
 }
 
 bool floatsResolve(const DepthLattice& lattice) {
-  constexpr double farthest = 0x1p21;  // in samples: floats resolve an eighth of one there
+  constexpr double farthest = 0x1p21;  // in samples; floats resolve an eighth of a sample there
   return lattice.first <= farthest * lattice.step;
 }
 

@@ -39,11 +39,12 @@ struct DepthLattice {
 /// [1/64, 64] or when a ray would need more than 2^24 samples.
 DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPerVoxel);
 
-/// Whether depths as floats tell the lattice's first samples apart. They don't if the camera is far away.
+/// Whether single-precision depths distinguish the lattice's first samples. They don't if the camera is far
+/// away.
 bool floatsResolve(const DepthLattice& lattice);
 
-/// The distance beyond its owned box, in its spacings, up to which a block with neighbours there has values.
-/// Gradients need that much: a voxel on each side of a sample's middle.
+/// The distance, in spacings, up to which a block has values beyond its owned box where it has neighbours.
+/// Gradients need one voxel on each side of a sample's middle.
 inline constexpr double valueReach = 1.0;
 
 /// The distance beyond the owned box to which the ends of slabs may reach.
@@ -54,10 +55,10 @@ inline constexpr double slabReach = 0.9;
 /// sample per voxel on.
 bool samplesAreSlabs(const Scene& scene, const View& view, const DepthLattice& lattice);
 
-/// The distance from its middle up to which a sample may be classified, because blocks have values up to
-/// there (valueReach): in samples of a ray along an axis. A ray whose direction's longest component is c has
-/// 1/c of it. The ends of slabs are nearer, but the outermost sample of a ray may reach farther, to the
-/// bounds. It has the material of the nearest place in reach.
+/// The distance from a sample's middle up to which blocks have values (valueReach), so that the sample may be
+/// classified there. The unit is one sample of a ray along an axis; a ray whose direction's longest component
+/// is c reaches 1/c as far. The ends of slabs are nearer, but a ray's outermost sample may extend farther, to
+/// the bounds. Beyond the reach, it has the material of the nearest place in reach.
 double outermostReach(const Scene& scene, const DepthLattice& lattice);
 
 }  // namespace vdi

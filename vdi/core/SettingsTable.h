@@ -26,21 +26,21 @@ struct Setting {
   double low = 0.0;           // the range, [low, high]
   double high = 1.0;
   bool excludesLow = false;                                     // (low, high]
-  double automatic = std::numeric_limits<double>::quiet_NaN();  // a value beside the range, or none
+  double automatic = std::numeric_limits<double>::quiet_NaN();  // a valid value outside the range; NaN: none
   /// For Kind::Name: the name of an enumerator in [0, high], and the enumerator of a name. The latter throws
   /// Error{InvalidArgument} that lists the valid names.
   const char* (*nameOf)(double) = nullptr;
   double (*named)(const std::string&) = nullptr;
 
   double (*get)(const GenerateSettings&) = nullptr;
-  /// A value beyond what the member's type holds becomes the nearest one that it does.
+  /// Clamps the value to the range of the member's type.
   void (*put)(GenerateSettings&, double) = nullptr;
 
   /// "0.5" or "merge".
   std::string text(double value) const;
   /// Throws Error{InvalidArgument} that names the setting, the value and the range.
   void check(double value) const;
-  /// `put`, after the check.
+  /// Calls check, then put.
   void set(GenerateSettings& settings, double value) const;
 };
 
@@ -51,8 +51,8 @@ std::size_t indexOfSetting(std::string_view property);
 /// "--termination-opacity"
 std::string optionOf(const Setting& setting);
 
-/// Checks the settings of the table and the others. Throws Error{InvalidArgument} naming the setting, its
-/// value and its range.
+/// Checks all settings, in the table or not. Throws Error{InvalidArgument} naming the setting, its value and
+/// its range.
 void validate(const GenerateSettings& settings);
 
 }  // namespace vdi

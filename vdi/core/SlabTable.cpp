@@ -72,7 +72,8 @@ namespace {
 /// Limits colours to white, also after rounding to half floats.
 glm::u16vec4 texelOf(const glm::dvec4& slab) {
   const glm::u16vec4 half = toHalf(glm::vec4(slab));
-  // Compares numbers: the bits of -0, which a falling slab gives to a channel of 0, exceed all others.
+  // Compares numbers, not bits: a falling slab gives -0 to a channel of 0, and the bits of -0 exceed all
+  // others.
   const glm::vec4 rounded = fromHalf(half);
   return toHalf(glm::max(glm::min(rounded, glm::vec4(rounded.a)), glm::vec4(0.0F)));
 }
@@ -84,7 +85,7 @@ std::size_t SlabTable::stripRows() const {
 }
 
 std::size_t SlabTable::levels() const {
-  // Up to one step of the square.
+  // The last strip's slabs span at least one step of the square.
   const double step = static_cast<double>(positions - 1) / slabStripStep;
   return static_cast<std::size_t>(std::max(std::ceil(std::log2(step)), 0.0)) + 1;
 }
@@ -135,7 +136,7 @@ SlabTable makeSlabTable(const TransferTable& transfer, float length) {
 
 namespace {
 
-/// Linear between texels; within one row if y is a whole number.
+/// Interpolates linearly between texels, within one row if y is a whole number.
 glm::vec4 texelsAt(const SlabTable& table, double x, double y) {
   const auto column = std::min(static_cast<std::size_t>(x), std::size_t{slabSide} - 2);
   const auto row = std::min(static_cast<std::size_t>(y), table.height() - 2);

@@ -39,16 +39,16 @@ class SlabIntegral {
 };
 
 /// A texture of slabs of one length. One filtered fetch gives any slab. Texels are premultiplied colour and
-/// opacity, whose means are right; among optical depths, those of opaque slabs would outweigh all others.
+/// opacity, which may be averaged; in a mean of optical depths, opaque slabs would outweigh all others.
 ///
 /// - Rows 0 .. slabSide - 1 are the square. Texel (x, y) runs from x to y, in slabSide - 1 steps over the
 ///   transfer table's range.
 /// - Below it follow levels() strips of stripRows() rows. They have the slabs whose ends are less than one
-///   step of the square apart, by the position in their middle. Strip l has slabs that span 2^l positions of
-///   the transfer table; those of strip 0 span none.
+///   step of the square apart, indexed by the position of their middle. Strip l has slabs that span 2^l
+///   positions of the transfer table; those of strip 0 span none.
 ///
-/// A strip is cut into rows that share a texel: entry e is in row e / slabStripStep, column e %
-/// slabStripStep, and again at the end of the row before.
+/// A strip is cut into rows, of which neighbours share a texel: entry e is in row e / slabStripStep, column e
+/// % slabStripStep, and again at the end of the row before.
 struct SlabTable {
   float length = 1.0F;               // of its slabs, in unit distances
   std::size_t positions = 0;         // of the transfer table: TransferTable::entries.size()

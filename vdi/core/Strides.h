@@ -36,19 +36,19 @@ inline std::int64_t offsetOf(const glm::ivec3& at, const ByteStrides& strides) {
   return at.x * strides.x + at.y * strides.y + at.z * strides.z;
 }
 
-/// The axis along which neighbours are nearest to each other; x if that is as good as another one.
+/// The axis along which neighbours are nearest to each other; x in a tie.
 inline int fastestAxis(const ByteStrides& strides) {
   const ByteStrides size = glm::abs(strides);
   if (size.x <= size.y && size.x <= size.z) return 0;
   return size.y <= size.z ? 1 : 2;
 }
 
-/// Divides a box of values into tiles. The values of one, gathered, stay in the cache beside the core. A tile
-/// is long along the axis on which its values lie side by side, where memory is read fastest, and has whole
-/// lines of the cache along x, for the writer.
+/// Divides a box of values into tiles. A tile's gathered values stay in the core's own cache. A tile is long
+/// along the axis on which its values are adjacent, where memory is read fastest, and has whole cache lines
+/// along x for writing.
 class Tiling {
  public:
-  static constexpr int width = 16;     // along x, where another axis is the fastest
+  static constexpr int width = 16;     // along x if another axis is the fastest
   static constexpr int values = 4096;  // at most, in a tile
 
   Tiling(const IndexBox& box, int fastest) : box_(box), tile_(1) {
@@ -77,7 +77,8 @@ class Tiling {
 
 namespace detail {
 
-/// The innermost loop follows the axis that is fastest in `from`, the next one that in `to`.
+/// The innermost loop follows the fastest axis of `from`; the next loop follows the faster of the others in
+/// `to`.
 template <std::size_t bytes>
 void copyTile(const std::byte* from, const ByteStrides& fromStrides, std::byte* to,
               const ByteStrides& toStrides, const glm::ivec3& size) {

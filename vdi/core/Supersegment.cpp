@@ -25,7 +25,7 @@ Precision precisionFromString(const std::string& name) {
 }
 
 DepthCode depthCodeFor(const DepthLattice& lattice) {
-  // Rays begin and end up to half a sample beside the lattice; codes at most half a sample apart keep these
+  // Rays begin and end up to half a sample off the lattice; codes at most half a sample apart keep these
   // intervals from vanishing. Codes finer than floats at that distance would add nothing.
   const double perSample = std::floor(DepthCode::largest / (lattice.count + 1.0));
   if (lattice.count == 0 || perSample < 2.0) return {};

@@ -40,8 +40,8 @@ static_assert(sizeof(Supersegment) == 24);
 /// optical depth has 12 bits, see opticalDepthOfCode. The encoder of a list carries each supersegment's
 /// rounding error over to the next one (reference/Compaction.h), so errors do not add up along the list.
 struct CompactSupersegment {
-  std::uint32_t depths = 0;    // bits 0 - 13 front, 14 - 27 back, 28 - 31 the optical depth's low bits
-  std::uint32_t material = 0;  // bits 0 - 7 red, 8 - 15 green, 16 - 23 blue, 24 - 31 its high bits
+  std::uint32_t depths = 0;    // bits 0 - 13 front, 14 - 27 back, 28 - 31 low bits of the optical depth
+  std::uint32_t material = 0;  // bits 0 - 7 red, 8 - 15 green, 16 - 23 blue, 24 - 31 its remaining bits
 
   static CompactSupersegment pack(std::uint32_t front, std::uint32_t back, std::uint32_t red,
                                   std::uint32_t green, std::uint32_t blue, std::uint32_t opticalDepth) {
@@ -71,7 +71,7 @@ inline Precision precisionOf(const DepthCode& code) {
 }
 
 /// The code for depths on the lattice. Its step divides a sample, so the lattice's depths have codes of their
-/// own. Its step is 0 (no code) for a lattice of more samples than fit, 8190.
+/// own. Its step is 0 (no code) for a lattice of more than 8190 samples.
 DepthCode depthCodeFor(const DepthLattice& lattice);
 
 /// Optical depth of codes 0 .. 4095: 2^-20 for code 0, then (2^(code * 16 / 4095) - 1) / 16. Steps are

@@ -36,8 +36,8 @@ ListsOf<Segment> taken(const ListsOf<Segment>& lists, const std::vector<std::uin
   return few;
 }
 
-/// Indices, among `many` lists along an axis, of those at the centres of `few`, which cover `share` as much;
-/// -1 for a centre outside all of them.
+/// Indices of the lists, among `many` along an axis, in which the centres of `few` lists lie. The few cover
+/// `share` times the extent of the many; a centre outside all of these gets -1.
 std::vector<int> placesOf(int few, int many, double share) {
   std::vector<int> places(static_cast<std::size_t>(few));
   for (int i = 0; i < few; ++i) {

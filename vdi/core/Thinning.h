@@ -15,8 +15,8 @@ Vdi thinned(const Vdi& vdi, int factor);
 /// The effect of thinned() on a VDI, without lists, for readers that do not have all of them at once.
 struct Thinning {
   Vdi few;  // the thinned VDI, but for its lists; the depth code is that of the VDI given
-  /// [few.height][few.width]: the list of the whole VDI that becomes this one, in ascending order; noList for
-  /// one that stays empty.
+  /// [few.height][few.width]: the index of the whole VDI's list that becomes this list, in ascending order;
+  /// noList for a list that stays empty.
   std::vector<std::uint32_t> sources;
   static constexpr std::uint32_t noList = ~std::uint32_t{0};
 };

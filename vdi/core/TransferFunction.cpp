@@ -131,7 +131,7 @@ glm::dvec4 meanOver(const TransferFunction& function, const std::vector<double>&
   glm::dvec4 sum(0.0);
   double from = lo;
   const auto add = [&](double to) {
-    // The values just inside: at a step, the function has another value on each side.
+    // Takes the values just inside, because a step has a different value on each side.
     const double inset = 1e-9 * (to - from);
     const glm::dvec4 middle = entryAt(function, 0.5 * (from + to));
     sum +=
@@ -162,7 +162,7 @@ TransferTable bake(const TransferFunction& transferFunction) {
     return closest * static_cast<double>(size - 1) >= 2.0 * (table.max - table.min);
   };
   if (!resolves(largestTable)) {
-    // The table leaves out where the function is constant, or transparent, to its end.
+    // Leaves out the ends at which the function is constant or transparent.
     table.min = opacities[opaque.first].x;
     table.max = opacities[opaque.last].x;
     if (opacities.front().opacity > 0.0) table.min = std::min(table.min, colors[hues.first].x);
@@ -173,8 +173,8 @@ TransferTable bake(const TransferFunction& transferFunction) {
   addSteps(opacities, opaque, steps);
   std::sort(steps.begin(), steps.end());
   if (!(table.max > table.min)) {
-    // A single scalar, with a step or without. Values are floats, so the table is much wider than their
-    // rounding errors.
+    // The function has nodes at a single scalar, with a step or without. The table is made much wider than
+    // the rounding errors of floats.
     const double half = std::max(std::abs(table.min), 1e-30) * 1e-3;
     table.min -= half;
     table.max += half;
@@ -197,8 +197,8 @@ TransferTable bake(const TransferFunction& transferFunction) {
     double x = table.min + range * static_cast<double>(i) / static_cast<double>(size - 1);
     glm::vec4 entry;
     if (isFine) {
-      // Of two nodes at a scalar, the later one counts. So the ramp that makes a step ends at or before it:
-      // the entry before has the value behind the step.
+      // Of two nodes at one scalar, the later one counts. The table's ramp for a step must end at or before
+      // the step, so the entry before the step gets the value behind it.
       const auto step = std::upper_bound(steps.begin(), steps.end(), x);
       if (step != steps.end() && *step < x + perEntry) x = *step;
       entry = entryAt(transferFunction, x);

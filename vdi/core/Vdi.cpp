@@ -61,7 +61,7 @@ SupersegmentLists Vdi::expandedLists() const {
 
 void validateShape(const Vdi& vdi) {
   if (vdi.width < 1 || vdi.height < 1) fail(fmt::format("{} x {} lists", vdi.width, vdi.height));
-  // Avoids the sum, which large values would overflow.
+  // Does not double the margin, since large values would overflow.
   const auto leavesSome = [](int size, int margin) { return margin >= 0 && margin <= (size - 1) / 2; };
   if (!leavesSome(vdi.width, vdi.margin.x) || !leavesSome(vdi.height, vdi.margin.y)) {
     fail(fmt::format("a margin of {} and {} of {} x {} lists", vdi.margin.x, vdi.margin.y, vdi.width,

@@ -105,7 +105,7 @@ double listsAcross(const Box& bounds, const View& original, const View& view) {
 std::string describe(ViewpointIssue issue) {
   switch (issue) {
     case ViewpointIssue::Inside:
-      return "the viewpoint is inside the VDI's scene; move it outside, what is behind it isn't seen";
+      return "the viewpoint is inside the VDI's scene; move it outside to see what lies behind it";
     case ViewpointIssue::SeesNothing:
       return "the viewpoint doesn't see the VDI, which lies behind the camera or beside the picture";
     case ViewpointIssue::FarAway:

@@ -1,4 +1,4 @@
-// Whether a VDI can show its scene truthfully from a viewpoint.
+// Tests whether a VDI can show its scene truthfully from a viewpoint.
 #pragma once
 
 #include <optional>
@@ -20,7 +20,7 @@ enum class ViewpointIssue {
 /// Angle between the directions in which V_O and the viewpoint see the scene's centre.
 constexpr double farBesideDegrees = 60.0;
 
-/// The same angle, up to which a view counts as one from V_O.
+/// The largest such angle at which a view counts as one from V_O.
 constexpr double besideDegrees = 5.0;
 
 /// Diameter, in the picture, of the sphere around the scene.
@@ -34,8 +34,9 @@ std::optional<ViewpointIssue> viewpointIssue(const Box& bounds, const View& orig
 /// The angle, in degrees, between the directions in which `original` and `camera` see the scene's centre.
 double degreesBetween(const Box& bounds, const Camera& original, const Camera& camera);
 
-/// The number of lists in a row across the view, at the depth of the scene's centre. It is V_O's number if
-/// both views see equally much, and smaller in a nearer view. 0 if the centre isn't in front of the view.
+/// The number of lists in a row across the view, at the depth of the scene's centre. It equals V_O's number
+/// if both views see equal widths, and is smaller in a nearer view. 0 if the centre isn't in front of the
+/// view.
 double listsAcross(const Box& bounds, const View& original, const View& view);
 
 /// The issue in words, for a warning.
