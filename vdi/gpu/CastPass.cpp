@@ -104,7 +104,7 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
                                 : algorithm == Algorithm::Bisection ? shared::castProgramSearch
                                 : writes                            ? shared::castProgramWritePreSegments
                                                                     : shared::castProgramCountPreSegments;
-  // Only the search itself stores supersegments.
+  // Of these programs, only the search stores supersegments.
   const std::uint32_t encoding = program == shared::castProgramSearch ? encodingOf(band.form) : 0;
   const shared::CastConstants constants{writes ? shared::castModeWrite : shared::castModeSearch,
                                         band.firstRow, band.lastRow};

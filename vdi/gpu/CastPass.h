@@ -55,7 +55,7 @@ class CastPass {
   /// Specialisation of cast.comp, besides the number of pages.
   struct Program {
     std::uint32_t program = 0;   // shared::castProgram...
-    std::uint32_t encoding = 0;  // its number
+    std::uint32_t encoding = 0;  // number of the encoding
     std::uint32_t lanesPerRay = 1;
     std::uint32_t samplesAhead = 1;
     bool cutAtGaps = false;

@@ -61,7 +61,7 @@ class Commands {
   /// Returns when the last submission is complete, at once if there is none. Throws Error{DeviceFailure} on
   /// device loss.
   void wait();
-  /// For use after an error: waits whatever the outcome. Afterwards the submission no longer uses any memory.
+  /// For use after an error: waits without throwing. Afterwards the submission no longer uses any memory.
   void drop() noexcept;
   void submitAndWait() {
     submit();
@@ -73,8 +73,8 @@ class Commands {
                 std::uint32_t y = 1, std::uint32_t z = 1) {
     dispatchBytes(pipeline, std::as_bytes(std::span(&constants, 1)), x, y, z);
   }
-  /// Dispatches workgroups of `group` invocations for `count` of them, over two axes, since devices need not
-  /// allow more than 65535 per axis. An invocation's index is gl_GlobalInvocationID.x +
+  /// Dispatches `count` invocations in workgroups of `group`, over two axes, since devices need not allow
+  /// more than 65535 workgroups per axis. An invocation's index is gl_GlobalInvocationID.x +
   /// gl_GlobalInvocationID.y * gl_NumWorkGroups.x * group.
   template <typename PushConstants>
   void dispatchMany(const ComputePipeline& pipeline, const PushConstants& constants, std::uint64_t count,
@@ -96,7 +96,7 @@ class Commands {
   void dispatchIndirectBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants,
                              const Buffer& groups);
 
-  /// Everything recorded before is finished and visible to everything recorded later. Writes of the host
+  /// Makes everything recorded before finish and be visible to everything recorded later. Writes of the host
   /// before submit() are visible anyway, and so are all results to the host after wait().
   void barrier();
 

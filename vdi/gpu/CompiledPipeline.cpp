@@ -8,7 +8,7 @@ namespace vdi::gpu {
 
 namespace {
 
-/// Exists only while the pipeline is made.
+/// A module that exists only while its pipeline is made.
 class ShaderModule {
  public:
   ShaderModule(VkDevice device, std::span<const std::uint32_t> code) : device_(device) {

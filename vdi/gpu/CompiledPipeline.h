@@ -25,11 +25,11 @@ struct ComputePipelineInfo {
   std::string_view shader;  // name for shaderCode
   std::span<const std::uint32_t>
       code;  // SPIR-V to use instead if it is not empty; needed during construction only
-  std::uint32_t pushConstantBytes = 0;  // at most 128
-  std::uint32_t imageCount = 0;         // size of the sampler3D array at set 0, binding 0
-  std::uint32_t uniformBytes = 0;       // size of the uniform block at set 0, binding 1; 0: none
-  bool hasPlane = false;                // whether there is a sampler2D at set 0, binding 2
-  bool wholeSubgroups = false;          // of DeviceLimits::subgroupSize; the workgroup is a multiple of it
+  std::uint32_t pushConstantBytes = 0;        // at most 128
+  std::uint32_t imageCount = 0;               // size of the sampler3D array at set 0, binding 0
+  std::uint32_t uniformBytes = 0;             // size of the uniform block at set 0, binding 1; 0: none
+  bool hasPlane = false;                      // whether there is a sampler2D at set 0, binding 2
+  bool wholeSubgroups = false;                // full subgroups of subgroupSize, which divides the workgroup
   std::vector<std::uint32_t> specialization;  // constant_id 0, 1, ... as raw 32-bit words
 };
 

@@ -1,4 +1,4 @@
-// Dispatches composite.comp: segments interleaved lists again, to the budget.
+// Dispatches composite.comp: segments interleaved lists again to fit the budget.
 #pragma once
 
 #include <cstdint>

@@ -44,7 +44,7 @@ void DepositPass::start(std::span<const glm::ivec3> blocks) {
 
 void DepositPass::add(std::span<const shared::DepositParticle> particles) {
   if (particles.empty()) return;
-  commands_.wait();  // the last particles' memory is used again
+  commands_.wait();  // the previous particles' memory is reused
   particles_.reserve(device_, particles.size_bytes(), MemoryKind::Upload);
   std::memcpy(particles_.mapped().data(), particles.data(), particles.size_bytes());
   shared::DepositConstants constants{};

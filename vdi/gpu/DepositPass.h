@@ -14,15 +14,15 @@
 
 namespace vdi::gpu {
 
-/// Sums of a rank's blocks: 8 bytes a cell on the device. Sums wrap around beyond 63 bits.
+/// The sums of a rank's blocks, 8 bytes per cell on the device. Sums wrap around beyond 63 bits.
 class DepositPass {
  public:
   explicit DepositPass(std::shared_ptr<Device> device);
 
   /// Sets the sums of blocks with that many cells per axis to 0. Throws Error{OutOfMemory}.
   void start(std::span<const glm::ivec3> blocks);
-  /// Adds these particles, whose `block` are indices of start's blocks. Copies them and returns; the next
-  /// call waits for the device.
+  /// Adds particles, whose `block` fields index start's blocks. Returns after copying them; the next call
+  /// waits for the device.
   void add(std::span<const shared::DepositParticle> particles);
   /// Calls use(block, first cell, sums) for parts of all blocks' sums, in order.
   template <typename Use>

@@ -17,10 +17,10 @@ class Device {
  public:
   /// Throws Error{DeviceUnavailable}; the text lists every device of the machine and why it was refused, or
   /// says that there is no Vulkan driver, that the validation layer is missing, or that the device cannot be
-  /// opened. Required are Vulkan 1.3, a compute queue with timestamps, hostQueryReset, bufferDeviceAddress,
-  /// scalarBlockLayout, shaderInt64, timelineSemaphore, synchronization2, maintenance4, subgroup shuffles,
-  /// and linear filtering of 3-D R32_SFLOAT, R16_UNORM and R8_UNORM images. Preference: discrete, integrated,
-  /// virtual, CPU.
+  /// opened. The device must have Vulkan 1.3, a compute queue with timestamps, hostQueryReset,
+  /// bufferDeviceAddress, scalarBlockLayout, shaderInt64, timelineSemaphore, synchronization2, maintenance4,
+  /// subgroup shuffles, and linear filtering of 3-D R32_SFLOAT, R16_UNORM and R8_UNORM images. The order of
+  /// preference is discrete, integrated, virtual, CPU.
   static std::shared_ptr<Device> create(const DeviceRequest& request);
   /// Returns a line per device: index, name, type, driver, memory, "usable" or the reason why it is not.
   /// Throws Error{DeviceUnavailable} if Vulkan is installed but unusable.

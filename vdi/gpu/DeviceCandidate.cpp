@@ -38,9 +38,9 @@ std::uint64_t largestDeviceHeap(VkPhysicalDevice device) {
   return largest;
 }
 
-/// Computes on the first family with timestamps: on common hardware it also has graphics and can use the
-/// whole device, while compute-only families may share it. Transfers use a family that can do nothing else
-/// (copy engines), if it copies boxes with any offset.
+/// Finds the queue families. Computing uses the first family with timestamps: on common hardware it also has
+/// graphics and can use the whole device, while compute-only families may get a part of it. Transfers use a
+/// family that can do nothing else (copy engines), if it copies boxes with any offset.
 bool findFamilies(VkPhysicalDevice device, DeviceCandidate& candidate) {
   std::uint32_t count = 0;
   vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
@@ -71,7 +71,7 @@ bool filtersLinearly(VkPhysicalDevice device, VkFormat format) {
   return (properties.optimalTilingFeatures & wanted) == wanted;
 }
 
-/// 0 without VK_EXT_external_memory_host.
+/// DeviceLimits::hostPointerAlignment; 0 without VK_EXT_external_memory_host.
 std::uint64_t hostPointerAlignment(VkPhysicalDevice device) {
   std::uint32_t count = 0;
   vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr);

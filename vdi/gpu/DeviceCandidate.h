@@ -1,4 +1,4 @@
-// A device of the machine before the choice: its properties, and the requirements that it misses.
+// A device that can be chosen: its properties, and the requirements that it doesn't meet.
 #pragma once
 
 #include <vulkan/vulkan.h>

@@ -19,7 +19,7 @@ struct DeviceSummary {
   DeviceType type = DeviceType::Other;
   std::string driver;                 // name and version
   std::uint64_t memoryBytes = 0;      // of the largest device-local heap
-  std::vector<std::string> refusals;  // all requirements that it misses; empty: usable
+  std::vector<std::string> refusals;  // all requirements that it doesn't meet; empty: usable
 };
 
 /// Returns a line per device: index, name, type, driver, memory, "usable" or the reason why it is not.

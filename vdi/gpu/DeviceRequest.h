@@ -22,7 +22,7 @@ struct DeviceRequest {
   std::uint64_t mostBytes = 0;
   /// False: behaves as a device that cannot import the process's memory, to test the alternative.
   bool importsHostMemory = true;
-  /// The folder that keeps compiled shaders from run to run; empty: none does.
+  /// The folder that keeps compiled shaders from run to run; empty: no shaders are kept.
   std::string cacheFolder;
 };
 

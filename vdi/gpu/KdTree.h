@@ -1,4 +1,4 @@
-// The order in which rays meet bricks. Host code, no Vulkan.
+// The kd-tree that gives the order in which rays meet bricks. This code runs on the host, without Vulkan.
 #pragma once
 
 #include <vector>

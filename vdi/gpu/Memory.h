@@ -28,8 +28,8 @@ std::uint64_t texelBytes(VkFormat format);
 class Buffer {
  public:
   Buffer() = default;
-  /// Size 0 is rounded up to 16 bytes. Throws Error{OutOfMemory} with the MiB requested, the MiB that this
-  /// Device's Buffers and Images hold, and the device's size.
+  /// Smaller sizes are rounded up to 16 bytes. Throws Error{OutOfMemory} with the MiB requested, the MiB that
+  /// this Device's Buffers and Images hold, and the device's memory.
   Buffer(std::shared_ptr<Device> device, std::uint64_t bytes, MemoryKind kind);
   ~Buffer();
   Buffer(Buffer&& other) noexcept;
@@ -49,8 +49,8 @@ class Buffer {
   }
 
   /// Makes the buffer hold at least `bytes`: keeps it if it is large enough, else replaces it and loses the
-  /// contents. The first allocation has just `bytes`. A larger one has half as much again if the device has
-  /// that, so that slow growth does not reallocate every frame. Returns true if the buffer was replaced. If
+  /// contents. The first allocation has exactly `bytes`. Later ones have half as much again if the device has
+  /// room, so that slow growth does not reallocate every frame. Returns true if the buffer was replaced. If
   /// it throws, the buffer is empty. `kind` must not change.
   bool reserve(const std::shared_ptr<Device>& device, std::uint64_t bytes, MemoryKind kind);
 

@@ -22,11 +22,11 @@ namespace {
 
 constexpr std::uint64_t maxBytes = 256ULL << 20;
 
-/// At the file's beginning.
+/// The file's header.
 struct Header {
   std::array<char, 8> what{'v', 'd', 'i', 's', 'h', 'd', 'r', '1'};
   std::uint64_t bytes = 0;     // of the data, which follow
-  std::uint64_t checksum = 0;  // of the data: drivers need not notice damage
+  std::uint64_t checksum = 0;  // of the data, because drivers need not notice damage
 };
 
 /// FNV-1a.
@@ -51,7 +51,7 @@ bool readAll(int descriptor, std::span<std::byte> to) {
   return true;
 }
 
-/// Whether the data begin with Vulkan's header for this device, and have more than that.
+/// Whether the data begin with Vulkan's header for this device, followed by more.
 bool suits(std::span<const std::byte> data, const PipelineCacheKey& key) {
   VkPipelineCacheHeaderVersionOne header{};
   if (data.size() <= sizeof header) return false;
@@ -103,7 +103,7 @@ std::vector<std::byte> PipelineCacheFile::read() const noexcept {
     std::vector<std::byte> data(header.bytes);
     if (!readAll(file.number(), data) || checksumOf(data) != header.checksum || !suits(data, key_)) return {};
     return data;
-  } catch (const std::exception&) {  // no memory
+  } catch (const std::exception&) {  // out of memory
     return {};
   }
 }

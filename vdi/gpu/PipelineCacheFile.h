@@ -22,17 +22,17 @@ struct PipelineCacheKey {
 };
 PipelineCacheKey pipelineCacheKeyOf(VkPhysicalDevice device);
 
-/// A file of `folder`. None of the functions throws: a cache that can't be read or written only costs time.
-/// Several processes may read and write at once: a reader finds one writer's whole data, or none.
+/// A file in `folder`. No function throws: a cache that can't be read or written only costs time. Several
+/// processes may read and write at once: a reader finds one writer's whole data, or none.
 class PipelineCacheFile {
  public:
-  /// An empty folder: there is no file.
+  /// If `folder` is empty, there is no file.
   PipelineCacheFile(std::string folder, const PipelineCacheKey& key);
 
   /// Data for VkPipelineCacheCreateInfo. Empty unless the file is this user's own, whole, and the key's.
   std::vector<std::byte> read() const noexcept;
-  /// Replaces the file, and makes the folder. Does nothing if `data` are Vulkan's header alone, which is all
-  /// that a driver gives if it keeps compiled shaders itself, or keeps none.
+  /// Replaces the file, and creates the folder if necessary. Does nothing if `data` are Vulkan's header
+  /// alone, which is all that a driver gives if it keeps compiled shaders itself, or keeps none.
   void write(std::span<const std::byte> data) const noexcept;
 
  private:

@@ -20,17 +20,17 @@ class PipelineSet {
  public:
   /// `common` is the info without the specialisation. `hasPrograms`: the shader is one of PROGRAMS in
   /// CMakeLists.txt, and the first word of a specialisation, constant 0, is the program's number. CPU devices
-  /// get the program without the code of the others, which they compile several times as fast.
+  /// get the program without the others' code, which compiles several times as fast.
   PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common, bool hasPrograms = false);
-  /// Shares the uniforms of another set, which updates them, and has programs if that does.
+  /// Shares the uniforms of another set, which updates them. Has programs if that set does.
   PipelineSet(const PipelineSet& updated, ComputePipelineInfo common);
   ComputePipeline& with(const std::vector<std::uint32_t>& specialization);
   /// Compiles a pipeline for the device, so that its first use won't wait. Any thread may call it beside the
   /// other calls.
   void compile(const std::vector<std::uint32_t>& specialization) const;
-  /// Sets the uniforms that all pipelines have for the commands recorded next; records nothing if they have
-  /// these values already. Uniforms are in device-local memory, where shaders read them as fast as constants;
-  /// a GPU would fetch them from host memory again and again.
+  /// Sets the uniforms of all pipelines for the commands recorded next; records nothing if the values are
+  /// unchanged. Uniforms are in device-local memory, where shaders read them as fast as constants; a GPU
+  /// would fetch them from host memory again and again.
   template <typename Uniforms>
   void update(Commands& commands, const Uniforms& uniforms) {
     updateBytes(commands, std::as_bytes(std::span(&uniforms, 1)));
@@ -47,8 +47,8 @@ class PipelineSet {
   bool hasPrograms_ = false;
   std::shared_ptr<const Buffer> uniforms_;  // shared by all pipelines; null without uniforms
   std::vector<std::byte> updated_;          // the values of the last update
-  const Commands* updatedBy_ = nullptr;     // the commands that recorded it
-  std::uint64_t updatedBehind_ = 0;         // and their number of submissions at that time
+  const Commands* updatedBy_ = nullptr;     // the commands that recorded the update
+  std::uint64_t updatedBehind_ = 0;         // their number of submissions at that time
   std::map<std::vector<std::uint32_t>, std::unique_ptr<ComputePipeline>> pipelines_;
 };
 

@@ -14,7 +14,7 @@ namespace vdi::gpu {
 
 class ReducePass {
  public:
-  /// Whether a subgroup merges a list that fits it, or always a single invocation.
+  /// Yes: a subgroup merges each list that fits its memory. No: a single invocation merges each list.
   enum class Subgroups { Yes, No };
 
   /// The default is Yes if the device has DeviceLimits::subgroupSize and runs programs for GPUs.
@@ -23,10 +23,10 @@ class ReducePass {
 
   struct MaxPerList {
     std::uint32_t supersegments = 1;
-    bool always = true;  // false: or more, where gaps require that
+    bool always = true;  // false: lists may have more where gaps require it
   };
 
-  /// `constants` lack longLists, longListCount and subgroupCapacity.
+  /// Sets longLists, longListCount and subgroupCapacity of `constants`.
   void record(Commands& commands, shared::ReduceConstants constants, const MaxPerList& maxPerList);
 
  private:

@@ -18,20 +18,19 @@ ComputePipelineInfo renderInfo(std::string_view shader) {
   return info;
 }
 
-/// Invocations that share a ray (render.comp). With more of them, the set-up of each costs more than they
-/// save.
+/// Invocations that share a ray (render.comp). More invocations would take longer to set up than they save.
 std::uint32_t lanesPerRayFor(const Device& device) {
   return device.runsGpuPrograms() && device.limits().subgroupSize > 0 ? 2 : 1;
 }
 
-/// The common course of a view's rays, taken from the one in the middle.
+/// The common course of a view's rays, taken from the middle ray.
 struct Course {
   bool isNear = false;  // nearly along V_O's: rays meet many supersegments of each of a few lists
   glm::vec2 way{0.0F};  // columns and rows of V_O's picture that a ray crosses within the VDI's depths
 };
 
 Course courseOf(const shared::RenderParams& params, const shared::RenderRays& rays) {
-  if (!(rays.directionBase.z > 0.0F)) return {};  // among them rays without a direction
+  if (!(rays.directionBase.z > 0.0F)) return {};  // includes rays without a direction
   const bool parallel = params.parallel != 0;
   const auto placeAt = [&](float depth) {
     const float t = (depth - rays.originBase.z) / rays.directionBase.z;

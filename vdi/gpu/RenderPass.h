@@ -26,10 +26,10 @@ shared::RenderRays renderRays(const View& original, const View& view);
 class RenderPass {
  public:
   explicit RenderPass(const std::shared_ptr<Device>& device);
-  /// Call after a barrier. `params` lack the queue. `form` is one of shared::renderPicture....
+  /// Call after a barrier. Sets the queue of `params`. `form` is one of shared::renderPicture....
   void record(Commands& commands, shared::RenderParams params, const shared::RenderRays& rays,
               Reconstruction reconstruction, std::uint32_t form);
-  /// Compiles what most views need. Any thread may call it beside the other calls.
+  /// Compiles the pipeline that most views need. Any thread may call it beside the other calls.
   void compile(Reconstruction reconstruction, std::uint32_t form) const;
 
  private:

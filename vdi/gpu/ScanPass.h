@@ -17,12 +17,12 @@ class ScanPass {
   explicit ScanPass(std::shared_ptr<Device> device);
 
   /// Computes prefix[0 .. count]: the exclusive prefix sum of values[0 .. count - 1], with the total at
-  /// prefix[count]. Records its barriers, including one at the start and one at the end. No dispatch recorded
-  /// before may be running.
+  /// prefix[count]. Records its barriers, including one at the start and one at the end. No earlier dispatch
+  /// of this pass may be running.
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count);
   /// Also records whether the total fits: `guard` (a word) becomes 1 if the total is at most `room` and the
-  /// word `before`, if given, is 1; else 0. The next dispatches can read it, and do nothing, before the host
-  /// has seen the total.
+  /// word `before`, if given, is 1; else 0. Later dispatches read it and do nothing if it is 0, before the
+  /// host has seen the total.
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count,
               const Buffer& guard, std::uint64_t room, const Buffer* before = nullptr);
 
@@ -30,7 +30,7 @@ class ScanPass {
   void recordRebase(Commands& commands, const Buffer& prefix, std::uint64_t first, std::uint32_t count,
                     std::uint32_t base);
 
-  /// Throws Error{OutOfMemory} if the total of the last finished scan didn't fit 32 bits.
+  /// Throws Error{OutOfMemory} if the total of the last finished scan didn't fit into 32 bits.
   void requireNoOverflow() const;
 
  private:

@@ -34,7 +34,7 @@ class Packer {
       rowHeight_ = 0;
       layerDepth_ = 0;
     }
-    // A page is only as large as what it holds, which may be narrower than `side`.
+    // A page is only as large as its contents, which may be narrower than `side`.
     const glm::uvec3 used = glm::max(used_, cursor_ + dims);
     if (used.z > maxDepth_ || volumeOf(used) > maxTexels_) return false;
     at = cursor_;
@@ -96,8 +96,8 @@ ValueMap valueMapOf(const Block& block) {
                     toString(block.type), range.min, range.max, maximum));
   }
   if (!(range.min < range.max)) return {1.0, std::isfinite(range.min) ? range.min : 0.0, false, range};
-  // Texels count from 0, or from the value nearest to it: floats resolve small values best, and a large
-  // negative fill value leaves the others what they are.
+  // Texels are relative to 0, or to the value nearest to 0: floats resolve small values best, and a large
+  // negative fill value leaves the others unchanged.
   const double offset = std::clamp(0.0, range.min, range.max);
   return {std::max(range.max - offset, offset - range.min), offset, false, range};
 }

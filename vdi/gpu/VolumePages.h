@@ -1,4 +1,4 @@
-// How blocks become texels: the format, and each piece's place in a 3-D texture ("page").
+// The texels of blocks: their format, and each piece's place in a 3-D texture ("page").
 #pragma once
 
 #include <vulkan/vulkan.h>
@@ -43,8 +43,8 @@ struct VolumePiece {
   bool samePlaceAs(const VolumePiece& other) const { return dims == other.dims && format == other.format; }
 };
 
-/// Values around the samples that a piece serves, where the block was cut: gradients read a voxel beyond the
-/// face (valueReach).
+/// Layers of values around the samples that a piece serves, where the block was cut: gradients read one voxel
+/// beyond the face (valueReach).
 constexpr int pieceMargin = 1;
 
 /// Cuts the block, extra layers included, into pieces that each fit a page. They overlap, so that each can

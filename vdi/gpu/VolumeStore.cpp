@@ -106,7 +106,7 @@ std::uint64_t VolumeStore::texelBytesHeld() const {
   return bytes;
 }
 
-/// Prepares all but the values: pages, macrocells and bricks; and begins the upload.
+/// Prepares pages, macrocells and bricks, and begins the upload of values.
 void VolumeStore::lay(Step& step, std::span<const Block> blocks, const Scene& scene) {
   validate(blocks);
   step.tree.clear();

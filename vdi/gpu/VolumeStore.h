@@ -98,7 +98,7 @@ class VolumeStore {
     std::vector<shared::Brick> bricks;  // leaves; placeTable sets the table fields
     std::vector<std::uint32_t> pieceOfBrick;
     std::vector<shared::KdNode> tree;
-    std::vector<shared::CellPiece> cellPieces;  // one a piece; placeTable sets the table fields
+    std::vector<shared::CellPiece> cellPieces;  // one per piece; placeTable sets the table fields
     std::uint32_t cellCount = 0;
     ScalarRange range;      // of finite values
     bool infinite = false;  // whether some values are infinite

@@ -14,7 +14,7 @@ namespace vdi::gpu {
 
 namespace {
 
-constexpr std::uint64_t stagingBytes = 32ULL << 20;  // each of the two
+constexpr std::uint64_t stagingBytes = 32ULL << 20;  // in each of the two buffers
 
 /// Below this size, importing memory takes longer than copying it.
 constexpr std::uint64_t minImport = 1ULL << 20;
@@ -25,7 +25,8 @@ constexpr std::size_t maxImports = 256;
 /// Below this number of cores, copying values takes longer than pinning their pages.
 constexpr std::size_t coresThatCopyFaster = 2;
 
-/// Infinite texels would turn everything interpolated with them into NaN, even with weight 0.
+/// Makes infinite texels finite: they would turn everything interpolated with them into NaN, even with weight
+/// 0.
 float filterable(float texel) {
   const auto infinite = bit_cast<float>(shared::infiniteTexelBits);
   return std::isinf(texel) ? std::copysign(infinite, texel) : texel;
@@ -46,7 +47,7 @@ bool anyInfinite(const Block& block, const IndexBox& part) {
   return false;
 }
 
-/// The distances of rows and slices, in values and in rows.
+/// The distance between rows in values, and between slices in rows.
 struct Pitches {
   int row = 0;
   int rows = 0;
@@ -66,8 +67,8 @@ std::optional<Pitches> pitchesOf(const Block& block) {
   return Pitches{static_cast<int>(strides.y / bytes), static_cast<int>(strides.z / strides.y)};
 }
 
-/// `count` values as texels. The unsigned integer formats shift signed values up. The float format is
-/// relative to the block's range, except for f32, which is stored as it is unless it is infinite.
+/// Converts `count` values to texels. The unsigned integer formats shift signed values up. The float format
+/// is relative to the block's range, except for f32, which is stored as it is unless it is infinite.
 template <typename From, typename To, typename Convert>
 void convertRow(const void* from, std::size_t first, std::size_t count, std::byte* to, Convert convert) {
   const auto* values = static_cast<const From*>(from) + first;
@@ -123,7 +124,7 @@ void writeBox(const VolumePiece& piece, const IndexBox& box, std::byte* to) {
   for (const Patch& patch : block.patchList()) {
     if (!patch.box.intersection(box).empty()) patches.push_back(&patch);
   }
-  // Writes the part of an array of values, of the box `of`, that lies in `part`.
+  // Writes `part` from an array that holds the values of the box `of`.
   const auto writeArray = [&](const void* values, const IndexBox& of, const IndexBox& part) {
     for (int z = part.lo.z; z < part.hi.z; ++z) {
       for (int y = part.lo.y; y < part.hi.y; ++y) {
@@ -134,7 +135,7 @@ void writeBox(const VolumePiece& piece, const IndexBox& box, std::byte* to) {
     }
   };
   const Tiling tiles = block.tilesOf(box);
-  constexpr std::size_t minimum = 64;  // these take some 100 us
+  constexpr std::size_t minimum = 64;  // copying these takes some 100 us
   inParallel(tiles.count(), minimum, [&](std::size_t first, std::size_t last) {
     TileBuffer buffer;
     for (std::size_t i = first; i < last; ++i) {
@@ -189,7 +190,7 @@ void VolumeUpload::turnOver() {
   filling().filled = 0;
 }
 
-/// Copies the piece's stored values from host memory. False if it cannot be imported, or is too small.
+/// Copies the piece's stored values from host memory. Returns false if the values must be staged instead.
 /// `imported` must stay until the copies are complete.
 bool VolumeUpload::copyDirectly(const VolumePiece& piece, const SampledImage& page,
                                 std::vector<Buffer>& imported) {

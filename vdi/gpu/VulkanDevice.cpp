@@ -105,7 +105,7 @@ VulkanDevice::~VulkanDevice() {
   release();
 }
 
-/// Writes the compiled shaders to the cache's file if their bytes differ in number from those it had.
+/// Writes the compiled shaders to the cache's file if their size differs from that of the file's data.
 void VulkanDevice::saveCache() const noexcept {
   try {
     std::size_t bytes = 0;

@@ -94,7 +94,7 @@ class VulkanDevice {
   std::mutex queueMutex_;
   mutable std::atomic<bool> lost_ = false;
   PipelineCacheFile cacheFile_;
-  std::size_t cachedBytes_ = 0;  // that the file had
+  std::size_t cachedBytes_ = 0;  // size of the file's data
   VkPipelineCache cache_ = VK_NULL_HANDLE;
   CompiledPipelines compiled_;
   VkPhysicalDeviceMemoryProperties memory_{};

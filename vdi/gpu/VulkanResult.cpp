@@ -9,7 +9,7 @@
 
 namespace vdi::gpu {
 
-// Converts vulkan.hpp's ErrorDeviceLost to VK_ERROR_DEVICE_LOST.
+// Converts, for example, vulkan.hpp's ErrorDeviceLost to VK_ERROR_DEVICE_LOST.
 std::string nameOf(VkResult result) {
   std::string name = "VK";
   bool wasLower = true;
