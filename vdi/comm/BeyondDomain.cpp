@@ -24,10 +24,10 @@ double limitedDifference(double last, double before) {
   return std::clamp(next, -bound, 2.0 * bound) * (last > 0.0 ? 1.0 : -1.0);
 }
 
-/// Values that decide on the next one along an axis.
+/// Number of values that determine the next one along an axis.
 constexpr int deciding = 3;
 
-/// Patches with the values around them that decide on their open places.
+/// Patches with the values around them that determine their open places.
 struct Window {
   IndexBox box;
   std::array<std::ptrdiff_t, 3> strides{};  // of neighbours along each axis
@@ -78,7 +78,7 @@ class Continuation {
   }
 
  private:
-  /// There are many, so they are small.
+  /// An open place. There are many, so each is small.
   struct Place {
     std::size_t position;  // in the patch's window
     std::uint32_t patch;

@@ -48,7 +48,7 @@ std::vector<BlockEntry> entriesOf(std::span<const Block> blocks, int rank) {
   return entries;
 }
 
-/// The distance, per axis, by which faces of the two blocks may differ and count as one.
+/// The distance, per axis, by which faces of the two blocks may differ and yet count as one.
 glm::dvec3 toleranceOf(const BlockEntry& a, const BlockEntry& b) {
   return latticeTolerance * glm::min(a.spacing, b.spacing);
 }
@@ -57,8 +57,8 @@ bool overlapBy(const Box& a, const Box& b, const glm::dvec3& tolerance) {
   return glm::all(glm::greaterThan(glm::min(a.hi, b.hi) - glm::max(a.lo, b.lo), tolerance));
 }
 
-/// Processes the faces of all blocks along one axis, in order: faces that follow each other within the
-/// tolerance become the lowest of them.
+/// Merges close faces of all blocks along one axis: faces that follow each other within the tolerance all
+/// move to the lowest of them.
 void makeFacesOne(std::span<BlockEntry> entries, int axis) {
   struct Face {
     double at;
@@ -249,7 +249,7 @@ double BlockDirectory::gapBeside(std::size_t index, const Box& box, int axis, bo
 std::vector<OwnParts> settleOverlaps(const Communicator& comm, const BlockDirectory& directory) {
   const std::span<const BlockEntry> entries = directory.entries();
   std::vector<OwnParts> parts;
-  std::array<std::uint64_t, 1> conflict{0};  // the first conflicting pair of all, counted from the end
+  std::array<std::uint64_t, 1> conflict{0};  // complement of the first conflicting pair; 0: none
   comm.together([&] {
     for (std::size_t i = directory.firstMine(); i < directory.lastMine(); ++i) {
       const BlockEntry& own = entries[i];

@@ -53,7 +53,7 @@ class BoxTree {
   explicit BoxTree(std::vector<Box> boxes);
   /// Indices of the boxes that meet `box`, faces included, ascending.
   std::vector<std::size_t> meeting(const Box& box) const;
-  /// Index of a box that contains the point, boxes being half-open; nullopt if there is none.
+  /// Index of a half-open box that contains the point; nullopt if there is none.
   std::optional<std::size_t> containing(const glm::dvec3& point) const;
 
  private:
@@ -107,8 +107,7 @@ struct OwnParts {
 
 /// Collective. Gives the finest block everything that blocks of different levels share. Element [i] has the
 /// parts that are left of entry firstMine() + i. If two blocks of one level overlap by more than
-/// latticeTolerance on every axis, all ranks throw Error{InvalidArgument}. It names both blocks, in words
-/// that do not depend on the ranks that have them.
+/// latticeTolerance on every axis, all ranks throw the same Error{InvalidArgument}, which names both blocks.
 std::vector<OwnParts> settleOverlaps(const Communicator& comm, const BlockDirectory& directory);
 
 }  // namespace vdi::comm

@@ -7,7 +7,7 @@ namespace vdi::comm {
 
 namespace {
 
-/// Written so that compilers vectorise it.
+/// Adds up to 255, in a loop that compilers vectorise.
 void addTo(std::span<std::byte> sum, std::span<const std::byte> other) {
   auto* a = reinterpret_cast<std::uint8_t*>(sum.data());
   const auto* b = reinterpret_cast<const std::uint8_t*>(other.data());

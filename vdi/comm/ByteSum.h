@@ -9,8 +9,8 @@
 
 namespace vdi::comm {
 
-/// Adds byte by byte, up to 255. Each rank adds up all ranks' bytes in its share of them, and all ranks get
-/// all sums. Ranks of one host read the sums in place.
+/// Adds byte by byte, up to 255. Each rank sums its share of the bytes over all ranks, and all ranks get all
+/// sums. Ranks of one host read the sums in place.
 class ByteSum {
  public:
   /// Not collective. `comm` must outlive it.
@@ -39,8 +39,8 @@ class ByteSum {
   Exchange scatter_;
   Exchange gather_;
   Exchange::Place own_;                     // this rank's bytes, replaced by sums
-  std::vector<Exchange::Outgoing> pieces_;  // with memory for one to each rank
-  std::vector<Stretch> stretches_;          // with memory for one of each rank
+  std::vector<Exchange::Outgoing> pieces_;  // has memory for one piece to each rank
+  std::vector<Stretch> stretches_;          // has memory for one stretch of each rank
   std::uint64_t bytes_ = 0;
 };
 

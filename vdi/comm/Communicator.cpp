@@ -54,7 +54,7 @@ struct Layout {
 
   explicit Layout(std::size_t ranks) : counts(ranks), starts(ranks) {}
 
-  /// Needs no memory.
+  /// Allocates no memory.
   void set(std::span<const std::uint64_t> sizes) {
     total = 0;
     for (std::size_t r = 0; r < sizes.size(); ++r) {
@@ -82,7 +82,7 @@ Gathered emptyGathered(const Layout& layout, std::size_t elementBytes) {
   return result;
 }
 
-/// An exception's text in a fixed size: reporting exhausted memory needs no memory.
+/// An exception's text, of fixed size, because no memory may be left for the report.
 using Text = std::array<char, 1024>;
 
 Text describe(const std::exception_ptr& error) {
@@ -98,7 +98,7 @@ Text describe(const std::exception_ptr& error) {
   return text;
 }
 
-/// The simulated host of a rank, among several.
+/// The number of a rank's simulated host.
 int hostOf(int localRank) {
   const auto each = static_cast<int>(environmentCount("VDI_RANKS_PER_HOST", 0).value_or(0));
   return each > 0 ? localRank / each : 0;

@@ -27,15 +27,15 @@ struct Gathered {
 /// Owns a duplicate of an MPI communicator, or represents one rank without MPI. Movable, not copyable. Every
 /// rank must call all functions marked collective in the same order, one thread at a time. MPI errors become
 /// Error{Communication}. If a rank lacks memory, the ranks agree on it before they communicate: a collective
-/// that throws on one rank throws on all. So must their callers, between collectives: whatever allocates
-/// belongs into together().
+/// that throws on one rank throws on all. Callers must do the same between collectives: whatever allocates
+/// memory belongs inside together().
 class Communicator {
  public:
   /// One rank; never calls MPI.
   static Communicator serial();
   /// Duplicates the communicator (collective). `fortranHandle` = MPI_Comm_c2f(comm). Throws
   /// Error{Communication} if MPI is not initialised, Error{InvalidArgument} for MPI_COMM_NULL. For tests,
-  /// VDI_RANKS_PER_HOST=K makes each K ranks of a host count as a host of their own.
+  /// VDI_RANKS_PER_HOST=K makes every K ranks of a host count as a host of their own.
   static Communicator fromMpi(int fortranHandle);
   /// MPI_COMM_WORLD if MPI is initialised and not finalised, else serial(). Only for this project's programs,
   /// never for a plugin.
@@ -77,7 +77,7 @@ class Communicator {
   std::vector<std::byte> broadcast(std::vector<std::byte> bytes, int root) const;
   /// Returns the root's number on every rank.
   double broadcast(double number, int root) const;
-  /// Returns the text that `work` makes on the root, on every rank. Only the root calls `work`; if it throws
+  /// Returns, on every rank, the text that `work` makes on the root. Only the root calls `work`; if it throws
   /// there, all ranks throw as together's do.
   std::string broadcastText(FunctionRef<std::string()> work, int root) const;
   /// Returns every rank's bytes on every rank. Sizes may differ by rank.
@@ -92,17 +92,17 @@ class Communicator {
 
   /// Returns every rank's `words` on every rank: [size][words.size()]. All ranks pass the same number.
   std::vector<std::uint64_t> allGatherWords(std::span<const std::uint64_t> words) const;
-  /// Sends n words to each rank, to: [size][n], and stores those from each, from: [size][n].
+  /// Sends the n words `to`[r] to each rank r, and stores the n words from rank r in `from`[r].
   void allToAllWords(std::span<const std::uint64_t> to, std::span<std::uint64_t> from) const;
 
   /// Collective: returns if no rank has an error. Otherwise every rank throws: a rank with an error rethrows
-  /// its own, the others throw Error{RemoteRank} with the lowest failing rank's number and text.
+  /// its own; the others throw Error{RemoteRank} with the lowest failing rank's number and text.
   void agree(const std::exception_ptr& mine) const;
   /// Runs `work`, then calls agree() with its exception. Collective; `work` itself must not communicate.
   void together(FunctionRef<void()> work) const;
-  /// together that also returns whether `work` was true on any rank, in the same message.
+  /// Like together, and returns whether `work` was true on any rank, in the same message.
   bool anyTogether(FunctionRef<bool()> work) const;
-  /// together that also returns the result of `work` on each rank, in the same message.
+  /// Like together, and returns the result of `work` on each rank, in the same message.
   std::vector<std::uint64_t> gatherTogether(FunctionRef<std::uint64_t()> work) const;
   /// Collective: throws Error{InvalidArgument} on every rank if `fingerprint` differs between ranks; `what`
   /// names the compared value.
@@ -111,7 +111,8 @@ class Communicator {
     std::uint64_t value;
     const char* what;
   };
-  /// Compares several at once, which `work` returns as together's does; the error names all that differ.
+  /// Compares several values at once. `work` returns them under the rules of together; the error names all
+  /// that differ.
   void requireEqual(FunctionRef<std::vector<Fingerprint>()> work) const;
 
  private:
@@ -126,7 +127,7 @@ class Communicator {
 
 /// Point-to-point messages, all under way at once. The sent bytes and the receiving memory must stay until
 /// `wait`, or until the destructor, which waits too. Messages between a pair of ranks arrive in the order in
-/// which they were sent; both ranks must name the same sizes. Empty messages are not sent.
+/// which they were sent; both ranks must pass the same sizes. Empty messages are not sent.
 class Messages {
  public:
   explicit Messages(const Communicator& comm);  // takes no memory
@@ -136,8 +137,9 @@ class Messages {
   Messages(Messages&&) = delete;
   Messages& operator=(Messages&&) = delete;
 
-  /// Takes the memory for one more message, sent or received, of `bytes` bytes. Call it for each within
-  /// together(), before the first is sent: other ranks would wait for messages of a rank without memory.
+  /// Takes the memory for one more message, sent or received, of `bytes` bytes. Call it for each message
+  /// within together(), before the first is sent: other ranks would wait for messages of a rank without
+  /// memory.
   void reserve(std::uint64_t bytes);
   void send(int to, std::span<const std::byte> bytes);
   void receive(int from, std::span<std::byte> bytes);

@@ -14,7 +14,7 @@ namespace vdi::comm {
 
 namespace {
 
-/// Pieces begin at multiples of this, which devices copy fast.
+/// The alignment of pieces, with which devices copy fast.
 constexpr std::uint64_t alignment = 256;
 
 std::uint64_t aligned(std::uint64_t bytes) {
@@ -73,7 +73,7 @@ bool Exchange::openWindow(const std::string& name, std::uint64_t bytes) {
   if (window_) return true;
   try {
     window_ = HostMemory::open(name, bytes);
-  } catch (const Error&) {  // another file system there, for example
+  } catch (const Error&) {  // the rank may see another file system
     return false;
   }
   return true;
@@ -108,7 +108,7 @@ void Exchange::shareNewWindow(std::span<const std::uint64_t> sizes) {
     try {
       window_ = HostMemory::shared(total);
       name = window_->name();
-    } catch (const Error&) {  // too little shared memory: messages
+    } catch (const Error&) {  // with too little shared memory, ranks send messages
     }
   });
   const std::vector<std::uint64_t> names = comm_.allGatherWords(wordsOf(name));

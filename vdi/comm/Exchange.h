@@ -27,12 +27,12 @@ class Exchange {
     std::shared_ptr<HostMemory> memory;
     std::uint64_t at = 0;
   };
-  /// Collective. Returns the place for this rank's outgoing data, of at least `bytes`; it is the last one if
-  /// that is large enough. Invalidates the received data, on all ranks. All ranks throw if one is out of
-  /// memory.
+  /// Collective. Returns the place for this rank's outgoing data, of at least `bytes`; this is the previous
+  /// one if that is large enough. Invalidates the received data, on all ranks. All ranks throw if one is out
+  /// of memory.
   Place outbox(std::uint64_t bytes);
 
-  using Note = std::array<std::uint64_t, 2>;  // for the receiver, of any meaning
+  using Note = std::array<std::uint64_t, 2>;  // for the receiver, with any meaning
   struct Outgoing {
     int to = 0;
     std::uint64_t at = 0;  // in bytes, relative to the outbox
@@ -50,7 +50,7 @@ class Exchange {
   /// other exchange only a header.
   std::span<const Incoming> send(std::span<const Outgoing> pieces);
 
-  /// Whether this rank reads that rank's data in place.
+  /// Whether this rank reads the data of `rank` in place.
   bool sharesMemoryWith(int rank) const;
 
  private:

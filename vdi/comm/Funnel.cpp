@@ -59,7 +59,7 @@ struct Funnel::State {
 };
 
 Funnel::Funnel() : state_(std::make_unique<State>()) {
-  constexpr std::size_t usual = 8;  // an operation has one, and a chunk's messages are at most four
+  constexpr std::size_t usual = 8;  // an operation has one request, and a chunk's messages at most four
   state_->requests.reserve(usual);
 }
 Funnel::~Funnel() = default;

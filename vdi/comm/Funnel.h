@@ -8,7 +8,7 @@
 namespace vdi::comm {
 
 /// Carries a thread's MPI calls to the one thread that may make them. On each rank, a thread works within an
-/// Entry, and the program's main thread serves it now and then. Served operations never block: `serve`
+/// Entry, and the program's main thread serves it from time to time. Served operations never block: `serve`
 /// returns although another rank is late, so ranks may serve at different times, and do other work, including
 /// MPI calls, in between. The MPI library must make progress on an operation while its rank is in other MPI
 /// calls or serves.
@@ -21,7 +21,7 @@ class Funnel {
   Funnel(Funnel&&) = delete;
   Funnel& operator=(Funnel&&) = delete;
 
-  /// As long as it exists, operations of Communicators and Messages in its thread wait for another thread to
+  /// While an Entry exists, operations of Communicators and Messages in its thread wait for another thread to
   /// serve them.
   class Entry {
    public:

@@ -27,11 +27,11 @@ namespace {
 /// Rays need values to this distance beyond an owned box, in spacings.
 constexpr double reach = valueReach;
 
-/// In spacings: more than the distance by which rounding and latticeTolerance move a face, less than the
-/// distance that separates values.
+/// A tolerance in spacings, greater than the distance by which rounding and latticeTolerance move a face, but
+/// less than the distance between values.
 constexpr double indexTolerance = 0.01;
 
-/// Per axis, for a mean over finer values; if there are more of them, only these many are used.
+/// The most finer values per axis that a mean uses, even if there are more.
 constexpr int maxParts = 16;
 
 /// Closed gaps and `reach` are within this number of layers around the stored values.
@@ -72,8 +72,8 @@ void subtract(std::vector<IndexBox>& boxes, const IndexBox& hole) {
 /// parts. A block may need hundreds of questions.
 struct Question {
   std::int32_t grid;    // on the rank that answers
-  std::int32_t round;   // in which it is answered
-  std::int32_t copied;  // 1: copies of values, `shift` further in the answering grid
+  std::int32_t round;   // the round in which it is answered
+  std::int32_t copied;  // 1: for copies of values, which are `shift` further in the answering grid
   glm::ivec3 shift;
   IndexBox box;
   glm::ivec3 parts;  // per axis
@@ -135,7 +135,7 @@ struct Wanted {
   std::vector<IndexBox> asked;          // parts that other blocks have; they may overlap
   std::size_t copies = 0;               // number of values to copy
   std::shared_ptr<std::byte[]> values;  // of the block's type
-  std::vector<double> sums;             // if some are means or interpolated
+  std::vector<double> sums;             // empty unless some values are means or interpolated
   std::vector<double> weights;
 };
 
@@ -150,7 +150,7 @@ struct Grid {
   std::vector<Wanted> wanted;
   IndexBox asked;               // bounds of all values that other blocks have
   std::vector<OpenPatch> open;  // places where values are continued beyond the domain's faces
-  bool stale = true;            // values have arrived since they were continued
+  bool stale = true;            // values have arrived since the last continuation
 };
 
 /// The stored values as an array of the type.
@@ -261,14 +261,14 @@ class LayerExchange {
  private:
   /// The first round answers with values that coincide with a donor's own. The second one interpolates in
   /// donors of the asking level or finer ones, and later rounds interpolate in coarser ones, the coarsest
-  /// first. So each round finds the layers that it needs.
+  /// first. Thus each round finds the layers that it needs.
   static constexpr std::int32_t exactRound = 0;
   static constexpr std::int32_t interpolatedRound = 1;
   static constexpr std::int32_t firstCoarserRound = 2;
 
   struct Asked {
     Question question;
-    std::int32_t grid;  // that asks
+    std::int32_t grid;  // the asking grid
     std::int32_t wanted;
   };
 
@@ -440,7 +440,7 @@ class LayerExchange {
     return true;
   }
 
-  /// Makes layers where any block has values, with the nearest own values where no block has.
+  /// Makes layers where any block has values. Places without a value get the nearest own value.
   void makePatches(std::size_t gridIndex) {
     Grid& grid = grids_[gridIndex];
     const IndexBox stored = grid.block.stored();
@@ -483,8 +483,8 @@ class LayerExchange {
     if (!open.empty()) grid.open.push_back({wanted.box, wanted.values.get(), std::move(open)});
   }
 
-  /// Other levels interpolate in these values, which depend on values that arrive. So this runs before values
-  /// beyond the stored ones are read, and after the last round.
+  /// Other levels interpolate in the continued values, which depend on received ones. So this runs before
+  /// values beyond the stored ones are read, and after the last round.
   static void continueBeyondDomain(Grid& grid) {
     if (grid.stale && !grid.open.empty()) comm::continueBeyondDomain(grid.block, grid.open);
     grid.stale = false;
@@ -661,10 +661,10 @@ class LayerExchange {
   std::vector<std::int32_t> levelNumbers_;  // of the directory's entries: indices of levels_
   std::vector<Grid> grids_;
   std::vector<std::vector<Asked>> outgoing_;   // by the rank that answers
-  std::vector<std::uint64_t> rounds_;          // 1 for each in which a rank wants values
+  std::vector<std::uint64_t> rounds_;          // 1 for each round in which a rank wants values
   Gathered incoming_;                          // requests of other ranks
   std::array<SamplePlaces, 3> places_;         // memory for one answer at a time
-  std::array<std::vector<double>, 3> shares_;  // per axis, of an answer's values: those of their parts
+  std::array<std::vector<double>, 3> shares_;  // per axis, the share of each value's parts in an answer
   Sampler sampler_;
 };
 

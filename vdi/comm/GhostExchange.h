@@ -12,12 +12,12 @@ namespace vdi::comm {
 /// Collective. Gives each place one owner, for blocks of any ranks, levels and lattices.
 ///
 /// - Where blocks of different spacing overlap, the finest owns the common part. A block that finer ones
-///   cover in part becomes several that share its data. A block that they cover completely is removed.
-/// - Blocks of one level (a value represents the same volume, to 1 %) that overlap by more than 1e-3 of
-///   a spacing on every axis are an Error{InvalidArgument} on all ranks that names both.
+///   cover in part becomes several blocks that share its data. A block that they cover completely is removed.
+/// - Blocks of one level (a value represents the same volume, to 1 %) that overlap by more than 1e-3 of a
+///   spacing on every axis cause an Error{InvalidArgument} on all ranks, which names both.
 /// - Faces that differ by less than 1e-3 of a spacing become one.
 ///
-/// Blocks that own nothing are passed through. No values travel or are copied.
+/// Blocks that own nothing are passed through. No values are sent or copied.
 std::vector<Block> settleOwnership(const Communicator& comm, std::vector<Block> blocks);
 
 /// Collective. Calls settleOwnership, then adds neighbours' values: all that interpolation uses up to
@@ -25,7 +25,7 @@ std::vector<Block> settleOwnership(const Communicator& comm, std::vector<Block> 
 /// cells. Values arrive as `extra` layers and `patches` of the blocks; stored ones are not copied. Existing
 /// extra layers and patches are dropped.
 ///
-/// Gaps. Blocks of point data that are at most one spacing apart first close the gap. The coarser one owns
+/// Gaps. Blocks of point data that are at most one spacing apart first close the gap. The coarser block owns
 /// it, or the lower one of two of the same level.
 ///
 /// Values. Neighbours are blocks of any rank whose owned boxes contain a value's place. The finest one
@@ -44,12 +44,13 @@ std::vector<Block> settleOwnership(const Communicator& comm, std::vector<Block> 
 /// Elsewhere the owner's values replace them if interpolation would mix them with the block's own. `masked`
 /// values are replaced likewise.
 ///
-/// Scalar types that differ. All blocks become f32, or f64 if one of them is u32, i32 or f64. Then
-/// blocks of other types are copies.
+/// Scalar types that differ. All blocks become f32, or f64 if one of them is u32, i32 or f64. Blocks of other
+/// types are copied.
 ///
 /// Cost. Each rank plans for its own blocks. Descriptions of all blocks are gathered, some 200 bytes each.
-/// Values are requested and sent once, and once more for each level that others interpolate in. A block takes
-/// time and some 120 bytes for each neighbour that has values around it, thousands for one beside finer ones.
+/// Values are requested and sent once, and once more for each level in which others interpolate. A block
+/// takes time and some 120 bytes for each neighbour with values around it; beside finer blocks, it has
+/// thousands of neighbours.
 std::vector<Block> exchangeGhosts(const Communicator& comm, std::vector<Block> blocks);
 
 }  // namespace vdi::comm

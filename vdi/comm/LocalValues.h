@@ -32,7 +32,7 @@ class LocalValues {
   void takeCopies(const Block& block, const Indices& indices);
 
   std::vector<double> values_;
-  std::vector<double> row_;  // memory for stored values that are no array
+  std::vector<double> row_;  // memory for stored values that aren't an array
   Indices range_;
 };
 

@@ -1,4 +1,4 @@
-// How vdi/comm calls MPI: directly, or through the thread's Funnel. Private to vdi/comm.
+// Calls MPI directly, or through the thread's Funnel. Private to vdi/comm.
 #pragma once
 
 #include <mpi.h>
@@ -24,8 +24,8 @@ struct Operation {
   void carry(const char* name) const;
 };
 
-/// Calls a collective: `blocking` with `arguments`, or in a thread with a Funnel `starting`, which also takes
-/// a request.
+/// Calls a collective with `arguments`: `blocking`, or within a Funnel `starting`, which also takes a
+/// request.
 template <typename Blocking, typename Starting, typename... Arguments>
 void call(const char* name, Blocking blocking, Starting starting, Arguments... arguments) {
   if (!Operation::isCarried()) return check(blocking(arguments...), name);
@@ -43,7 +43,7 @@ void callHere(const char* name, const Function& function) {
   Operation{begin}.carry(name);
 }
 
-/// Waits until all requests are complete, and clears them. Up to eight of them keep their memory.
+/// Waits until all requests are complete, and clears them. A vector of up to eight requests keeps its memory.
 void waitForAll(std::vector<MPI_Request>& requests);
 
 }  // namespace vdi::comm

@@ -21,7 +21,7 @@ Ownership Ownership::balanced(std::uint64_t listCount, int ranks, std::span<cons
                               std::uint64_t listsPerWeight) {
   assert(ranks >= 1 && listsPerWeight >= 1 && weights.size() * listsPerWeight >= listCount);
   const auto size = static_cast<std::uint64_t>(ranks);
-  // The work of a stretch: its lists count as one supersegment each, plus its weight.
+  // The work of a stretch: its weight, plus one supersegment for each list.
   const auto workOf = [&](std::size_t i) {
     const std::uint64_t first = i * listsPerWeight;
     return weights[i] + std::min(listsPerWeight, listCount - std::min(first, listCount));
@@ -34,8 +34,8 @@ Ownership Ownership::balanced(std::uint64_t listCount, int ranks, std::span<cons
   std::uint64_t before = 0;  // work of stretches [0, i)
   std::size_t i = 0;
   for (std::uint64_t r = 1; r < size; ++r) {
-    // Integer arithmetic gives the same on all machines; a total beyond 2^64 / ranks would need more lists
-    // than can exist.
+    // Integer arithmetic gives the same result on all machines; a total beyond 2^64 / ranks would need more
+    // lists than can exist.
     const std::uint64_t wanted = total / size * r + total % size * r / size;
     while (i < weights.size() && before + workOf(i) <= wanted) before += workOf(i++);
     std::uint64_t boundary = std::min(i * listsPerWeight, listCount);

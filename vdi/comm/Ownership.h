@@ -1,4 +1,4 @@
-// Which rank composites which lists (paper, section 5.2). Pure arithmetic: no communication.
+// The assignment of lists to the ranks that composite them (paper, section 5.2), without communication.
 #pragma once
 
 #include <cstdint>

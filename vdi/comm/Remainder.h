@@ -15,7 +15,7 @@ class Remainder {
 
   bool empty() const { return nodes_.front().bounds.empty(); }
 
-  /// Takes `hole` away. Calls visit(common) for what it has in common with each part, in the order in which
+  /// Subtracts `hole`. Calls visit(common) for its intersection with each part, in the order in which
   /// `without` yields parts of parts.
   template <typename Visit>
   void subtract(const Box& hole, Visit visit) {
@@ -39,7 +39,7 @@ class Remainder {
 
  private:
   struct Node {
-    Box bounds;  // of what is left
+    Box bounds;  // of the parts that are left
     std::uint32_t parent;
     std::uint32_t first;  // of its parts, which follow each other
     std::uint32_t parts;  // 0: not cut yet, or nothing was left

@@ -55,7 +55,7 @@ Sampler::Sample Sampler::sampleAt(std::size_t axis, double place) {
   return sample;
 }
 
-/// The position of an index among the gathered ones, to which it is added. Samples come in ascending order.
+/// The position of an index among the gathered ones. Adds it if it is new. Samples come in ascending order.
 std::size_t Sampler::numberOf(std::size_t axis, int index) {
   const auto a = static_cast<int>(axis);
   const IndexBox all = block_->extended();

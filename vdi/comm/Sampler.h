@@ -11,12 +11,12 @@
 
 namespace vdi::comm {
 
-/// Along an axis, the places of the samples that make up each of some values, ascending.
+/// The ascending places, along an axis, of the samples that make up each of several values.
 struct SamplePlaces {
   std::vector<double> places;          // world
   std::vector<std::size_t> starts{0};  // in `places`: those of each value, and the end
 
-  /// The places after these are the next value's.
+  /// Ends a value: later places belong to the next one.
   void endValue() { starts.push_back(places.size()); }
   void clear();
 };
@@ -29,7 +29,7 @@ class Sampler {
   void prepare(const Block& block, const std::array<SamplePlaces, 3>& places);
   /// Whether the samples need values in layers beyond the stored ones.
   bool leavesStored() const;
-  /// Reads these values. Sums are of the values that the block had in this call.
+  /// Reads these values. Later sums use the values that the block has now.
   void gather() { values_.gather(*block_, indices_); }
 
   /// The sum over the samples of one value. Samples that are not finite count as the mean of the finite
@@ -38,7 +38,7 @@ class Sampler {
   double sum(const glm::ivec3& value) const;
 
  private:
-  /// A place along an axis: up to two values have a part in it.
+  /// A place along an axis, to which up to two values contribute.
   struct Sample {
     int count = 0;
     std::array<std::size_t, 2> offsets{};  // in the gathered values
