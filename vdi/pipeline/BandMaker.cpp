@@ -75,7 +75,7 @@ void BandMaker::agreeOnLists(RayCaster::Cast& cast) {
 }
 
 /// The owners of a band's lists, equal on all ranks. `weights` are the ranks' agreed weights of the whole
-/// picture, or none.
+/// picture, or empty.
 comm::Ownership BandMaker::ownershipOf(const RayCaster::Cast& cast, const Bands& all, std::size_t band,
                                        std::span<const std::uint32_t> weights) const {
   const std::uint64_t width = cast.build.width;

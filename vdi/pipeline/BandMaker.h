@@ -56,7 +56,7 @@ class BandMaker {
     gpu::Submission flattened;  // writes both buffers
   };
   /// Collective: makes a flat picture from runs alone. It is the limit case of the paper's section 5.3: one
-  /// supersegment a run, composited in order of depth. `pass`, which is collective, waits for a composited
+  /// supersegment per run, composited in order of depth. `pass`, which is collective, waits for a composited
   /// band (Compositor::finish) and sends it on; it is not called for the last band.
   void makeFlat(const RayCaster::Inputs& inputs, const Progress& progress, std::vector<FlatBand>& flat,
                 FunctionRef<void(std::size_t band)> pass, RankReport& report);
@@ -68,7 +68,7 @@ class BandMaker {
   void project(const RayCaster::Inputs& inputs, const Progress& progress, HostPool& pool,
                HostVector<std::uint64_t>& keys, RankReport& report);
 
-  /// Call when no frame is under way: the next frame uses the same memory as the last one after a restart.
+  /// Makes the next frame start with the first slot. Call when no frame is under way.
   void restart() { firstSlot_ = 0; }
   /// Waits for the submitted work and drops it. For use after an error.
   void drop() noexcept;
@@ -80,7 +80,7 @@ class BandMaker {
     comm::Ownership owned = comm::Ownership::equal(0, 1);
     std::unique_ptr<Distributor> distributor;
     Distributed parts;
-    gpu::Submission usedBy;  // uses the lists' memory
+    gpu::Submission usedBy;  // the last to use the lists' memory
   };
   Slot& slotOf(std::size_t band) { return slots_[(firstSlot_ + band) % slots_.size()]; }
   /// Makes the next frame's first band avoid the memory of this frame's last one.
@@ -124,7 +124,7 @@ class BandMaker {
   comm::ByteSum levelSum_;
   HostAccesses accesses_;  // to the memory of levelSum_
   std::array<Slot, RayCaster::bandsAtOnce> slots_;
-  std::size_t firstSlot_ = 0;  // of the current frame
+  std::size_t firstSlot_ = 0;  // of the current frame's first band
   std::vector<MergedBand> merged_;
 };
 

@@ -60,8 +60,8 @@ double Compositor::takeMilliseconds() {
   return std::exchange(milliseconds_, 0.0);
 }
 
-/// Copies received lists, one rank after the other: supersegments to received_; each rank's counts as a row,
-/// in words of four bytes to packedCounts_, or as a word each to subCounts_.
+/// Copies received lists, one rank after the other: supersegments to received_, and each rank's counts as a
+/// row, either one byte each to packedCounts_ or one word each to wideCounts_.
 void Compositor::receive(const Distributed& parts) {
   const std::uint64_t ranks = parts.subLists.size();
   const std::uint64_t rowWords = gpu::groupsFor(parts.listCount, shared::countsPerWord);

@@ -25,7 +25,7 @@ class Compositor {
     double sampleStep = 1.0;
     Algorithm algorithm = Algorithm::Merge;
     DepthCode code;       // of compact lists
-    float level = -1.0F;  // of all owners' histogram together, with Budget::Total
+    float level = -1.0F;  // with Budget::Total, from the histogram of all owners
   };
 
   /// Puts all ranks' supersegments of some lists in order of depth. The device goes on after this returns:

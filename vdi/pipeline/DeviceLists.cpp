@@ -27,9 +27,9 @@ ListDownload<Segment>::~ListDownload() {
 template <typename Segment>
 void ListDownload<Segment>::recordOffsets(gpu::Commands& commands, const DeviceLists& band,
                                           std::uint64_t firstList) {
-  if (firstList == 0 && band.listCount == listCount_) return;  // they are downloaded as they are
-  // The last band also writes the offset where the next one would begin. Other bands leave that to the next
-  // one, which may run before this one is repeated.
+  if (firstList == 0 && band.listCount == listCount_) return;  // the band's offsets are downloaded unchanged
+  // The last band also writes the final offset. Other bands leave that offset to the next band, which may run
+  // before this one is repeated.
   const std::uint64_t words = band.listCount + (firstList + band.listCount == listCount_ ? 1 : 0);
   commands.copy(band.offsets, 0, memory_.offsets, firstList * wordBytes, words * wordBytes);
 }

@@ -16,7 +16,7 @@ namespace vdi::detail {
 
 constexpr std::uint64_t wordBytes = sizeof(std::uint32_t);
 
-/// Compact lists as in ListsOf, in device memory that the next ones reuse.
+/// Compact lists as in ListsOf, in device memory that later lists reuse.
 struct DeviceLists {
   gpu::Buffer offsets;   // u32 [listCount + 1], exclusive prefix sum
   gpu::Buffer segments;  // [count], of an encoding's type
@@ -61,7 +61,7 @@ template <typename Segment>
 class ListDownload {
  public:
   /// `lists` come from listsIn(pool). `expected` is the number of supersegments to make room for; more of
-  /// them take another copy.
+  /// them cost another copy.
   ListDownload(ListsOf<Segment>& lists, HostPool& pool, DownloadMemory& memory, std::uint64_t listCount,
                std::uint64_t expected);
   ~ListDownload();

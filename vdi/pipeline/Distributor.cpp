@@ -82,7 +82,7 @@ void Distributor::recordPack(gpu::Commands& commands, const DeviceLists& lists,
   }
 }
 
-/// Packs all counts as words, if one of them does not fit a byte.
+/// Packs all counts as words, because one of them does not fit into a byte.
 void Distributor::packWide(const DeviceLists& lists) {
   commands_.begin();
   recordCounts(commands_, lists, true);

@@ -85,8 +85,8 @@ class Distributor {
   gpu::Buffer packed_;
   gpu::Buffer tooLarge_;
   gpu::Buffer boundaryOffsets_;  // number of supersegments before each stretch, [stretches + 1]
-  std::vector<comm::Exchange::Outgoing> pieces_;  // with memory for one to each rank
-  std::vector<Stretch> sent_;                     // of each piece
+  std::vector<comm::Exchange::Outgoing> pieces_;  // has memory for one piece to each rank
+  std::vector<Stretch> sent_;                     // the stretch of each piece
   bool wide_ = false;
   std::uint64_t bytesSent_ = 0;
 };

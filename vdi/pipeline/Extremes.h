@@ -10,9 +10,9 @@
 
 namespace vdi::detail {
 
-/// Colours a picture, all of whose pixels it sets. `keys` are extremeKey of shaders/blending.glsl: [height]
-/// [width], the largest of all ranks'. The high word grows with the scalar's position in the table (Maximum)
-/// or with its negative (Minimum), the low one with nearness.
+/// Colours a picture, all of whose pixels it sets. `keys` [height][width] are the largest values of
+/// extremeKey (shaders/blending.glsl) over all ranks. The high word grows with the scalar's position in the
+/// table (Maximum) or with its negative (Minimum), the low one with nearness.
 void colorExtremes(std::span<const std::uint64_t> keys, BlendMode mode, const TransferTable& table,
                    Image& image);
 

@@ -27,15 +27,15 @@ struct FrameState {
   std::unique_ptr<VdiSink> sink;
   /// With several ranks, the last band reaches the sink when the next frame is under way, or at the end.
   std::function<void()> addLastBand;
-  std::exception_ptr error;  // the reason of its failure
+  std::exception_ptr error;  // why the frame failed
 };
 
 /// Resources of a frame until its lists are on the root's host; frames take them in turns.
 struct Flight {
-  std::vector<OwnedLists> owned;  // one entry a band
+  std::vector<OwnedLists> owned;  // one entry per band
   std::unique_ptr<Gather> gather;
   std::unique_ptr<DownloadMemory> downloads;
-  std::shared_ptr<FrameState> frame;  // the frame that uses these resources, or did last
+  std::shared_ptr<FrameState> frame;  // the last frame to use these resources
   bool underWay() const { return frame && frame->sink; }
 };
 

@@ -82,7 +82,7 @@ void Gather::open(std::span<const std::byte> described) {
     if (here && header.memory.front() != '\0') {
       try {
         array.access = &opened_->of(header.memory.data(), header.memoryBytes);
-      } catch (const Error& error) {  // on another file system there, for example: uses messages
+      } catch (const Error& error) {  // for example another file system; uses messages
         if (error.code() != ErrorCode::Communication) throw;
       }
     }
@@ -103,7 +103,7 @@ void Gather::begin(HostPool& pool, std::span<const std::span<std::byte>> arrays)
     if (!isRoot) open(described);
   });
   if (isRoot) {
-    // All ranks that can open it have done so.
+    // All ranks that can open the memory have done so.
     for (const Array& array : arrays_) array.access->memory()->unlink();
   }
 }

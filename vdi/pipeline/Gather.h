@@ -1,4 +1,4 @@
-// Gathers data from all ranks' devices in arrays on the root's host. Not part of the library's interface.
+// Gathers data from all ranks' devices into arrays on the root's host. Not part of the library's interface.
 #pragma once
 
 #include <cstddef>
@@ -23,7 +23,7 @@ class OpenedMemory {
  public:
   explicit OpenedMemory(std::shared_ptr<gpu::Device> device) : device_(std::move(device)) {}
   HostAccess& of(const std::string& name, std::uint64_t bytes);
-  /// Forgets all memory except these names'.
+  /// Forgets all memory except that of these names.
   void keep(const std::vector<std::string>& names);
 
  private:
@@ -76,7 +76,7 @@ class Gather {
   std::vector<std::byte> describe(HostPool& pool, std::span<const std::span<std::byte>> arrays);
   void open(std::span<const std::byte> described);
   gpu::Commands& nextTransfer();
-  static constexpr std::size_t perMessage = 3;  // words that describe one
+  static constexpr std::size_t perMessage = 3;  // words that describe a message
   void sendMessages(std::span<const std::uint64_t> words);
 
   std::shared_ptr<gpu::Device> device_;

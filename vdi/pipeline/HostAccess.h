@@ -29,7 +29,7 @@ class HostAccess {
   /// was called.
   void recordWrite(gpu::Commands& commands, const gpu::Buffer& from, std::uint64_t fromOffset,
                    std::uint64_t at, std::uint64_t bytes);
-  /// Copies from `at` bytes into the memory to the device. The data must be there when this is called.
+  /// Copies from `at` bytes into the memory to the device. The memory must hold the data when this is called.
   void recordRead(gpu::Commands& commands, std::uint64_t at, const gpu::Buffer& to, std::uint64_t toOffset,
                   std::uint64_t bytes);
   /// Call after the commands complete; copies staged data to the host.

@@ -38,7 +38,7 @@ std::uint64_t ListBuilder::bytesPerList(std::uint32_t maxCount, Algorithm algori
   return segments + shared::maxPreSegments(maxCount) * sizeof(shared::StoredPreSegment);
 }
 
-/// Host work that may overlap the device's work for another builder.
+/// Reserves memory; this host work may overlap the device's work for another builder.
 void ListBuilder::reserve() {
   const Options& options = started_->options;
   DeviceLists& lists = *started_->lists;
@@ -113,7 +113,7 @@ void ListBuilder::drop() {
   started_.reset();
 }
 
-/// Submits the steps with `behind`, and their error status.
+/// Submits the steps, the download of their status, and the work of `behind`.
 void ListBuilder::submit() {
   commands_.copy(status_, 0, statusReadback_, 0, statusReadback_.size());
   if (started_->behind) started_->behind(commands_);

@@ -37,7 +37,7 @@ struct BandTargets {
   std::uint64_t guard = 0;
 };
 
-/// The shaders' name for the form in which such lists are stored.
+/// The form, for shaders, in which lists with this depth code are stored.
 gpu::shared::StoredForm storedForm(const DepthCode& code);
 
 /// Device milliseconds of all steps, of the algorithm's first step, and of its second one, each with its
@@ -68,7 +68,7 @@ class ListBuilder {
     std::uint32_t width = 0;  // lists in a row
     std::uint32_t rows = 0;
     bool rowBehind = false;           // another row follows the band's last one
-    std::uint32_t countedStride = 1;  // merge: `rows` is a multiple of it, or nothing follows
+    std::uint32_t countedStride = 1;  // merge: divides `rows`, except in the last band
     Algorithm algorithm = Algorithm::Merge;
     gpu::ReducePass::MaxPerList maxPerList;
     double sampleStep = 1.0;
@@ -82,7 +82,7 @@ class ListBuilder {
       std::uint32_t budget = 1;
     };
     std::optional<Agreed> agreed;
-    /// Merging with other ranks: one supersegment a run, as a flat picture needs. Nothing is counted.
+    /// Merging with other ranks: one supersegment per run, as a flat picture needs. Nothing is counted.
     bool runsOnly = false;
     /// Merging interleaved lists: address of the lists that fit the budget as they are. 0: none.
     std::uint64_t fitting = 0;
@@ -104,9 +104,9 @@ class ListBuilder {
   /// buffers must stay until `finish`. `after` is the last submission that uses the lists' memory.
   void start(const Options& options, Record record, DeviceLists& lists, Behind behind = {},
              const gpu::Submission& after = {});
-  /// Waits. If the memory of the frame before was too small, submits steps again. Then `lists` are complete,
-  /// compact or full as the code says. Throws Error{OutOfMemory} if the supersegments do not fit,
-  /// Error{DeviceFailure} if a list's written count differs from its stored count.
+  /// Waits for the steps. If the previous frame's memory was too small, submits steps again. Then `lists` are
+  /// complete, in the precision that the depth code implies. Throws Error{OutOfMemory} if the supersegments
+  /// do not fit, Error{DeviceFailure} if a list's written count differs from its stored count.
   void finish();
   /// Starts lists that are all empty.
   void startEmpty(std::uint32_t listCount, DeviceLists& lists, const Behind& behind = {});

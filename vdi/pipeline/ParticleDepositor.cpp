@@ -42,13 +42,13 @@ struct Range {
   std::size_t last;
 };
 
-/// The most cells that an invocation goes through. It goes through those of a kernel twice. Lavapipe ends an
-/// invocation's loops after 65535 passes. On a GPU the bound keeps dispatches short.
+/// The most cells that an invocation visits. It visits a kernel's cells twice. Lavapipe ends an invocation's
+/// loops after 65535 passes. On a GPU the bound keeps dispatches short.
 constexpr double mostCellsOnCpu = 1 << 14;
 constexpr double mostCellsOnGpu = 1 << 20;
 
 /// The total of the weights' magnitudes of all ranks is at most 2^totalBits units of the sums. A cell's share
-/// of a weight is at most 64 times it, and more than 1 only in ghost and hidden cells.
+/// of a weight is at most 64, and exceeds 1 only in ghost and hidden cells.
 constexpr int totalBits = 55;
 
 /// The exponent of the sums' unit: a power of two, so that the number of ranks hardly changes it.
@@ -160,7 +160,7 @@ void ParticleDepositor::State::add(std::span<const DepositParticle> particles) {
     pass.add(particles.subspan(first, std::min(entriesAtOnce, particles.size() - first)));
 }
 
-/// The sums in floats.
+/// Returns the sums as floats.
 std::vector<std::shared_ptr<float[]>> ParticleDepositor::State::values(DepositKind kind, int exponent) {
   std::vector<std::shared_ptr<float[]>> all;
   for (const Block& block : blocks) all.push_back(newValues(block.valueCount()));

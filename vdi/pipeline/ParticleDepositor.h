@@ -25,8 +25,8 @@ struct DepositedArray {
 /// the same bit for bit when repeated. A contribution below 2^-55 of the total weight of all ranks may be
 /// lost.
 ///
-/// Memory: on the device 8 bytes a stored cell, and on the host 4, which the result keeps. During `deposit`,
-/// particles travel in parts that take some 500 MiB at most.
+/// Memory: 8 bytes per stored cell on the device, and 4 on the host, which the result keeps. During
+/// `deposit`, particles travel in parts that take some 500 MiB at most.
 class ParticleDepositor {
  public:
   /// The communicator must outlive this object.

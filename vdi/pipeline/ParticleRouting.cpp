@@ -146,7 +146,7 @@ void ParticleRouting::findLattices() {
       const auto i = static_cast<std::size_t>(axis);
       key[i] = static_cast<double>(static_cast<float>(place.spacing[axis]));
       const double cells = (place.lower[axis] - places_.front().lower[axis]) / place.spacing[axis];
-      // From above -1/2 to 1/2 of a cell, since both ends are the same place.
+      // In (-1/2, 1/2] of a cell, since both ends are the same place.
       key[i + 3] = std::round((cells - std::ceil(cells - 0.5)) / (2.0 * coincidence));
     }
     place.lattice = lattices.try_emplace(key, lattices.size()).first->second;
@@ -308,7 +308,7 @@ double ParticleRouting::peakOf(const Spread& spread) {
   return splineAt(0.0) * size.x * size.y * size.z;
 }
 
-/// `met` is memory that the calls share.
+/// `met` is memory that all calls reuse.
 void ParticleRouting::send(Spread spread, int exponent, std::vector<const Place*>& met,
                            std::vector<RoutedParticle>& routed) const {
   double sum = 1.0;

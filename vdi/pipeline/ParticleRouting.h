@@ -80,7 +80,7 @@ class ParticleRouting {
     std::uint64_t place;
   };
   comm::BlockDirectory directory_;
-  std::vector<Place> places_;  // as the directory's entries
+  std::vector<Place> places_;  // in the order of the directory's entries
   std::vector<OwnedBox> owned_;
   std::unique_ptr<comm::BoxTree> ownedTree_;  // of owned_
   int mostCells_;

@@ -115,11 +115,11 @@ std::uint32_t RayCaster::rowsPerBand(const Inputs& inputs, std::uint64_t bytesPe
                                      std::uint32_t bands) const {
   const auto height = static_cast<std::uint64_t>(inputs.view.height());
   const std::uint64_t rowBytes = static_cast<std::uint64_t>(inputs.view.width()) * bytesPerPixel;
-  // Volumes beyond half the device leave less memory, which lists, pre-segments and other frames share.
+  // Volumes beyond half of the device's memory leave less for lists, pre-segments and other frames.
   const std::uint64_t memory = device_->limits().memoryBytes;
   const std::uint64_t left = memory - std::min(memory, volume_.texelBytesHeld());
   const std::uint64_t room = std::max(std::min(memory / 8, left / 4), rowBytes);
-  // A list takes one invocation or more, in workgroups of 64, whose number every device allows.
+  // Every device allows 65535 workgroups; each has 64 invocations, and a list takes one or more of them.
   constexpr std::uint64_t maxLists = std::uint64_t{64} * 65535;
   const std::uint64_t stride = shared::countedStride;
   const std::uint64_t most = maxLists / static_cast<std::uint64_t>(inputs.view.width()) / stride * stride;
@@ -285,7 +285,7 @@ void RayCaster::startBand(Cast& cast, std::uint32_t firstRow, std::uint32_t last
   }
   const auto record = [this, &cast, build, firstRow, lastRow](gpu::Commands& commands,
                                                               const BandTargets& targets, bool write) {
-    // The shader counts lists from the picture's first one; the targets hold only this band's.
+    // The shader counts lists from the picture's first one; the targets hold only this band's lists.
     const std::uint64_t skipped = std::uint64_t{firstRow} * build.width * sizeof(std::uint32_t);
     gpu::shared::CastParams params = cast.params;
     params.countedWidth = build.countedWidth();

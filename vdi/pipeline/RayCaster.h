@@ -30,7 +30,7 @@ class RayCaster {
   /// `bands` is the number per frame, if memory allows; 0 lets the device decide.
   RayCaster(std::shared_ptr<gpu::Device> device, std::uint32_t bands);
 
-  /// The volume to cast through; set its blocks there.
+  /// The volume to cast through. The caller sets its blocks.
   gpu::VolumeStore& volume() { return volume_; }
 
   struct Inputs {
@@ -40,7 +40,7 @@ class RayCaster {
     const TransferTable& table;
     const GenerateSettings& settings;
     bool cutAtGaps;
-    bool runsOnly;   // one supersegment a run, without a search
+    bool runsOnly;   // one supersegment per run, without a search
     DepthCode code;  // of compact lists
   };
   /// Called with the finished share; returning false ends the work early with the present result.
@@ -54,7 +54,7 @@ class RayCaster {
     bool nothingThere = false;
     std::uint32_t height = 0;
     std::uint32_t rowsPerBand = 1;  // as memory allows; a multiple of shared::countedStride, or all rows
-    bool agreed = false;            // with other ranks
+    bool agreed = false;            // ranks agree on each list's tolerance
   };
   Cast begin(const Inputs& inputs);
   /// Merging with several ranks: writes this rank's counts of the counted lists, levelBytes of them, to a
@@ -70,8 +70,8 @@ class RayCaster {
     std::uint64_t bytes = 0;
   };
   void takeLevelSum(Cast& cast, std::span<const LevelSum> sum);
-  /// Call after that: the number of supersegments that all ranks together will have in each stretch of
-  /// shared::countedStride rows.
+  /// Call after takeLevelSum. Returns the number of supersegments that all ranks together will have in each
+  /// stretch of shared::countedStride rows.
   std::vector<std::uint32_t> agreedWeights(const Cast& cast);
   /// Starts rows [firstRow, lastRow), which begin at a multiple of shared::countedStride. The device goes on
   /// after this returns; up to bandsAtOnce may be started before the first one is finished. `cast`, `lists`
@@ -89,7 +89,7 @@ class RayCaster {
   /// `keys`, which has the view's size and its memory from `pool`.
   void project(const Inputs& inputs, const Progress& progress, HostPool& pool,
                HostVector<std::uint64_t>& keys);
-  /// Times of the last frame, without transfers. A picture sets `all` only.
+  /// Times of the last frame, without transfers. A picture sets only `all`.
   const ListTimes& times() const { return times_; }
 
  private:
@@ -112,7 +112,7 @@ class RayCaster {
   gpu::VolumeStore volume_;
   gpu::CastPass pass_;
   std::array<ListBuilder, bandsAtOnce> builders_;  // taken in turns
-  std::size_t started_ = 0;                        // bands
+  std::size_t started_ = 0;                        // number of bands
   std::size_t finished_ = 0;
   gpu::Commands commands_;
   gpu::ComputePipeline quota_;  // the ranks' agreement on lists that they have counted together

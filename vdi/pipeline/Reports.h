@@ -13,12 +13,12 @@ struct RankReport {
   double uploadSeconds = 0.0;          // of setBlocks, or setNextBlocks and advance, since the last frame
   double generateSeconds = 0.0;        // casting and segmenting, transfers included
   double generateDeviceSeconds = 0.0;  // device work in generateSeconds, without transfers
-  /// device work of the first step: bisection's search or the counting of pre-segments
+  /// Device work of the first step: bisection's search or the counting of pre-segments.
   double countSeconds = 0.0;
   double writeSeconds = 0.0;  // device work of the second step
   double distributeSeconds = 0.0;
   double compositeSeconds = 0.0;
-  double compositeDeviceSeconds = 0.0;  // device work in these, and copying of received lists
+  double compositeDeviceSeconds = 0.0;  // device work in compositeSeconds, and copies of received lists
   double gatherSeconds = 0.0;
   double outputSeconds = 0.0;    // of write, in place of the gather: download, encoding and writing
   double samplesPerVoxel = 0.0;  // of the frame, also with automaticRate

@@ -64,7 +64,7 @@ TimeSteps::Step TimeSteps::send(std::vector<Block> blocks, bool fillGhosts,
   step.blocks = blocks.size();
   blocks = fillGhosts ? comm::exchangeGhosts(comm_, std::move(blocks))
                       : comm::settleOwnership(comm_, std::move(blocks));
-  step.scene = comm::globalScene(comm_, localScene(blocks));  // needs no memory
+  step.scene = comm::globalScene(comm_, localScene(blocks));  // allocates no memory
   step.probes = globalProbes(comm_, step.scene, blocks);
   comm_.together([&] { (volume_.*way)(blocks, step.scene); });
   step.uploadSeconds = watch.lap();
@@ -97,7 +97,7 @@ void TimeSteps::setNextBlocks(std::vector<Block> blocks, bool fillGhosts) {
   try {
     next_ = send(std::move(blocks), fillGhosts, &gpu::VolumeStore::setNextBlocks);
   } catch (...) {
-    dropNext();  // ranks that have not failed may have sent theirs
+    dropNext();  // other ranks may have sent their blocks
     throw;
   }
 }

@@ -34,7 +34,7 @@ class TimeSteps {
   double samplingRate(const TransferTable& table, const Region& region);
   /// Throws if the transfer function distinguishes values that floats cannot.
   void requireSpans(const TransferTable& table) const;
-  /// Adds this rank's times. Each upload is reported once.
+  /// Sets this rank's upload time, blocks and volume. Each upload time is reported once.
   void report(RankReport& report);
 
  private:

@@ -174,8 +174,8 @@ struct VdiGenerator::State {
             settings,       comm.size() > 1, runsOnly,         code};
   }
 
-  /// Runs the work of a frame. After an error, nothing may go on in memory that the next frame takes, so
-  /// unfinished frames that were started before fail too.
+  /// Runs the work of a frame. After an error, no work may go on in memory that the next frame takes, so
+  /// frames that were started before fail too.
   template <typename Work>
   void frame(Work work) {
     try {
@@ -257,7 +257,7 @@ struct VdiGenerator::State {
     });
   }
 
-  /// Brings the lists to the root's memory. Segment is the type that is sent and stored.
+  /// Makes a sink for the root's memory. Segment is the type that is sent and stored.
   template <typename Segment>
   std::unique_ptr<detail::VdiSink> hostSink(detail::Flight& flight, Vdi& vdi) {
     if (comm.size() == 1) return std::make_unique<detail::DownloadSink<Segment>>(pool, flight, vdi, expected);
@@ -322,8 +322,8 @@ struct VdiGenerator::State {
     bands->render(castInputsOf(prepared, settings, {}), progress, *pool, image, mine);
   }
 
-  /// Collective: renders the picture of the extreme scalars along the rays, on the root. Their order doesn't
-  /// matter, so ranks need no lists: each pixel's largest key is the result.
+  /// Collective: renders the picture of the extreme scalars along the rays, on the root. Ranks need no lists,
+  /// because the order of samples doesn't matter: each pixel's largest key is the result.
   void project(const Prepared& prepared, const GenerateSettings& settings, const Progress& progress,
                HostVector<std::uint64_t>& extremes, Image& image) {
     comm.together([&] {
@@ -453,7 +453,7 @@ WrittenVdi VdiGenerator::write(const std::filesystem::path& path, const Camera& 
     header.coloring->array = stamp.array;
   });
   return withSegment(precisionOf(header.depthCode), [&]<typename Segment>() {
-    detail::FileSink<Segment> sink(s.comm, root, path, *s.bandDownload);  // needs no memory
+    detail::FileSink<Segment> sink(s.comm, root, path, *s.bandDownload);  // allocates no memory
     s.wholeVdi(*prepared, settings, header, sink, progress);
     return sink.written();
   });

@@ -77,10 +77,10 @@ class VdiGenerator {
   std::optional<Vdi> generate(const Camera& camera, const TransferFunction& transferFunction,
                               const GenerateSettings& settings, const Progress& progress = {});
 
-  /// generate in two parts, so that frames overlap. When `start` returns, this rank's lists are made, and the
-  /// blocks, camera and function are no longer needed: setBlocks and advance may follow. Devices and copy
-  /// engines still composite and gather the VDI; `finish` waits for it. Starting the next frame before
-  /// finishing the last one hides that time:
+  /// Does the work of generate in two parts, so that frames overlap. When `start` returns, this rank's lists
+  /// are made, and the blocks, camera and function are no longer needed: setBlocks and advance may follow.
+  /// Devices and copy engines still composite and gather the VDI; `finish` waits for it. Starting the next
+  /// frame before finishing the last one hides that time:
   ///
   ///     VdiFrame last = generator.start(...);
   ///     while (more) {
@@ -101,9 +101,9 @@ class VdiGenerator {
   /// Writes the VDI of generate to a file (io/VdiFile.h). Each rank encodes and writes its own lists: no rank
   /// ever has the whole VDI, and a rank's host memory is bounded by its own lists. Ranks whose host lacks the
   /// folder send their encoded lists to rank 0, which holds one chunk of them at a time. The file equals that
-  /// of io::writeVdi byte for byte. No reader sees half of it, and if any rank fails, the old file stays.
-  /// `path` and `stamp` are rank 0's; other ranks' are ignored. Throws Error{Io} on the rank that cannot
-  /// write, with the path as context. The result is equal on all ranks.
+  /// of io::writeVdi byte for byte. No reader sees an incomplete file, and if any rank fails, the old file
+  /// stays. `path` and `stamp` are rank 0's; other ranks' are ignored. Throws Error{Io} on the rank that
+  /// cannot write, with the path as context. The result is equal on all ranks.
   WrittenVdi write(const std::filesystem::path& path, const Camera& camera,
                    const TransferFunction& transferFunction, const GenerateSettings& settings,
                    const TimeStamp& stamp = {}, const Progress& progress = {});
@@ -117,8 +117,8 @@ class VdiGenerator {
             const GenerateSettings& settings, const Progress& progress = {});
 
   /// Plain ray casting of the distributed volume through the same samples: the ground truth, on rank 0.
-  /// Ignores the settings' supersegments, algorithm and margin. All blend modes; the functions that make VDIs
-  /// throw Error{InvalidArgument} unless the mode is Composite.
+  /// Ignores the settings' supersegments, algorithm and margin. Supports all blend modes; the functions that
+  /// make VDIs throw Error{InvalidArgument} unless the mode is Composite.
   std::optional<Image> renderVolume(const Camera& camera, const TransferFunction& transferFunction,
                                     const GenerateSettings& settings, const Progress& progress = {});
 

@@ -196,7 +196,7 @@ gpu::Submission VdiLoader::add(const DeviceLists& band, std::uint64_t firstList)
     scan_.recordRebase(commands_, offsets_, firstList, static_cast<std::uint32_t>(words),
                        static_cast<std::uint32_t>(added_));
   }
-  // The loop handles as many at a time as fit 4 GiB (shared/lists.h).
+  // Each pass handles as many supersegments as fit into 4 GiB (shared/lists.h).
   constexpr std::uint64_t atOnce = std::uint64_t{1} << 26;
   for (std::uint64_t first = 0; first < band.count; first += atOnce) {
     recordSegments(band.segments.address() + first * segmentBytes_, added_ + first,

@@ -35,19 +35,19 @@ class VdiRenderer {
   /// Double buffering: copies the VDI into buffers of its own, while renders go on with the current VDI. Call
   /// from any one thread, but not beside setVdi, showPrepared or another prepareVdi. Returns when the VDI is
   /// on the device. Takes memory for a second VDI, and keeps it for the next one. Throws Error{OutOfMemory}
-  /// if there is none; the current VDI stays.
+  /// if memory is short; the current VDI stays.
   void prepareVdi(const Vdi& vdi);
   /// Shows the prepared VDI at once. Returns whether one was prepared.
   bool showPrepared();
   /// Later renders show the sides of the planes to which their normals point; initially no planes are set.
   /// Throws Error{InvalidArgument} for more than maxClipPlanes, and for planes that validate(Region) rejects.
   void setClipPlanes(std::vector<ClipPlane> planes);
-  /// Rays end at an opacity of 1 - 1/512, along V_O's at 1 - 1/1024: farther material changes an 8-bit colour
-  /// by half a step at most. Throws Error{InvalidArgument} before the first setVdi, and for cameras and sizes
-  /// that View rejects.
+  /// Rays end at an opacity of 1 - 1/512, or 1 - 1/1024 along V_O's rays: farther material changes an 8-bit
+  /// colour by half a step at most. Throws Error{InvalidArgument} before the first setVdi, and for cameras
+  /// and sizes that View rejects.
   Image render(const Camera& camera, int width, int height,
                Reconstruction reconstruction = defaultReconstruction);
-  /// Renders for a screen: downloads 8 instead of 20 bytes a pixel, since the download takes longer than
+  /// Renders for a screen: downloads 8 instead of 20 bytes per pixel, since the download takes longer than
   /// rendering. With Alpha::Premultiplied, each byte is toByte of the value that render gives. Valid until
   /// the next call.
   ImageBytes renderBytes(const Camera& camera, int width, int height, Alpha alpha,

@@ -40,7 +40,7 @@ class VdiSink {
     bool last = false;
   };
   using Wait = std::function<void()>;
-  /// Bands come in their order. `wait` returns when the band is made; it throws, so call it in
+  /// Bands come in their order. `wait` returns when the band is made; it may throw, so call it in
   /// Communicator::together. Returns the submission that uses the band's memory last, if any. The device
   /// makes the next band meanwhile. Adds its times to `report`.
   virtual gpu::Submission add(const Band& band, const Wait& wait, RankReport& report) = 0;

@@ -144,7 +144,7 @@ void VdiWriter<Segment>::encode(const ListsOf<Segment>& lists, std::size_t first
                    [&](io::EncodedChunk chunk) { keep(index++, std::move(chunk)); });
 }
 
-/// A chunk's offset is known once all chunks before it are encoded.
+/// Writes a chunk if all chunks before it are written, so that its offset is known; otherwise keeps it.
 template <typename Segment>
 void VdiWriter<Segment>::keep(std::uint64_t index, io::EncodedChunk chunk) {
   if (file_ && file_->takesOffsets() && index == firstChunks_) {
@@ -195,7 +195,7 @@ std::vector<typename VdiWriter<Segment>::ChunkPart> VdiWriter<Segment>::exchange
   comm_.together([&] {
     for (const Route& route : routes) {
       const bool own = route.from == comm_.rank();
-      if (own == (route.to == comm_.rank())) continue;  // stays here, or is others' business
+      if (own == (route.to == comm_.rank())) continue;  // stays here, or concerns other ranks
       messages.reserve((route.listCount + 1) * sizeof(std::uint32_t));
       messages.reserve(route.supersegmentCount * sizeof(Segment));
       if (own) continue;
@@ -329,7 +329,7 @@ void VdiWriter<Segment>::writeByRoot(const Table& table, std::span<const std::ui
       if (isRoot() && left(i)) largest = std::max(largest, table.entries[i].packedBytes);
     }
     received.resize(largest);
-    message.reserve(std::numeric_limits<std::uint32_t>::max());  // a chunk, one after the other
+    message.reserve(std::numeric_limits<std::uint32_t>::max());  // the largest chunk; one is sent at a time
   });
   // If the root fails, it still receives the others' chunks; otherwise they would wait for ever.
   std::exception_ptr error;

@@ -40,14 +40,14 @@ class VdiWriter {
   /// first chunks are written at once if the root has them.
   void add(std::uint64_t firstList, const ListsOf<Segment>& lists);
 
-  /// Collective; call when all ranks have added their lists. Equal on all ranks.
+  /// Collective; call when all ranks have added their lists. Returns the same on all ranks.
   WrittenVdi finish();
 
   std::uint64_t bytesSent() const { return bytesSent_; }        // to other ranks
   std::uint64_t bytesWritten() const { return bytesWritten_; }  // into the file, by this rank
 
  private:
-  /// Lists that are not a whole chunk, or not yet.
+  /// The lists of an incomplete chunk.
   struct ChunkPart {
     std::uint64_t firstList = 0;
     ListsOf<Segment> lists;
