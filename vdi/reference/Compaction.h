@@ -11,7 +11,7 @@
 namespace vdi::reference {
 
 /// Encodes a list front to back. Rounding errors of a supersegment are carried to the next one:
-///   * the error of the optical depth in front of everything later, at most 1/16 of it, and by changing at
+///   * the error of the optical depth in front of everything later, at most 1/16, and by changing at
 ///     most a quarter of the next supersegment's own optical depth;
 ///   * the error of the light that V_O sees, by changing the next supersegment's colour by at most 3/255.
 /// So V_O sees each list within 1/255, however many supersegments it has, and each supersegment stays close

@@ -62,7 +62,7 @@ double cubicSpline(double r, double h) {
   return 0.0;
 }
 
-/// How one particle of weight 1 spreads before its shares are divided by their sum.
+/// The spread of a particle of weight 1, before its shares are divided by their sum.
 struct Spread {
   glm::dvec3 position;
   glm::dvec3 spacing;  // of the owner's cells

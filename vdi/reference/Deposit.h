@@ -1,5 +1,5 @@
-// Deposition of particles on cells in double precision: what the device, on any number of ranks, is compared
-// with. vdi/core/Particles.h has the rules.
+// Deposition of particles on cells in double precision, with which tests compare the device's on any number
+// of ranks. vdi/core/Particles.h has the rules.
 #pragma once
 
 #include <span>
@@ -11,7 +11,8 @@
 namespace vdi::reference {
 
 struct Deposit {
-  std::vector<std::vector<double>> values;  // of each block, as its stored cells: ghost and hidden cells, too
+  /// Per block, one for each stored cell, ghost and hidden cells included.
+  std::vector<std::vector<double>> values;
   ParticleCounts counts;
 };
 

@@ -9,7 +9,7 @@ namespace vdi::reference {
 
 namespace {
 
-/// Interpolates nodes: linear between two of them, the last of several at one place, constant beyond all.
+/// Interpolates linearly between nodes; takes the last of several at one place; is constant beyond all nodes.
 template <typename Node, typename Value>
 Value valueAt(const std::vector<Node>& nodes, Value Node::*value, double x) {
   std::size_t next = 0;
@@ -82,7 +82,7 @@ glm::dvec4 integrate(const ExactVolume& volume, const TransferFunction& function
 
 namespace {
 
-/// Premultiplied; the opacity function's opacity as it is.
+/// Premultiplied colour and opacity, with the opacity function's own opacity.
 glm::dvec4 materialAt(const TransferFunction& function, double scalar) {
   const double opacity = valueAt(function.opacities, &OpacityNode::opacity, scalar);
   return {opacity * valueAt(function.colors, &ColorNode::color, scalar), opacity};

@@ -58,7 +58,7 @@ struct SampleRange {
 };
 
 SampleRange samplesIn(const OwnedBox& box, const SceneRay& ray, std::uint32_t count) {
-  // First the part of the ray in the box, in units of samples, with two samples to spare; then exactly,
+  // Finds the part of the ray in the box, in units of samples, with two samples to spare; then narrows it
   // sample by sample.
   float enter = 0.0F;
   auto leave = static_cast<float>(count);
@@ -90,10 +90,10 @@ SampleRange clippedSamples(const SampleRange& samples, const RayPart& part, floa
   return inside.first < inside.last ? inside : SampleRange{};
 }
 
-/// The bounds of the visible part, the scene's or a region's, seldom lie half-way between two samples: the
-/// first sample's interval starts where the ray enters them, the last one's ends where it leaves. If a ray
-/// leaves them before it reaches the middle of any sample, the part between is one sample, and its middle
-/// decides its owner. This depends on ray and scene alone, so it is the same on every rank.
+/// The bounds of the visible part (scene or region) seldom lie half-way between two samples: the first
+/// sample's interval starts where the ray enters them, the last one's ends where it leaves. If a ray leaves
+/// them before it reaches the middle of any sample, the part between is one sample, and its middle decides
+/// its owner. This depends on ray and scene alone, so it is the same on every rank.
 struct SceneStretch {
   SampleRange samples;
   float enter = 0.0F;  // depth
@@ -347,7 +347,7 @@ SupersegmentLists generate(const RayInputs& inputs, std::span<const Block> block
   const int height = inputs.view.height();
   SupersegmentLists lists;
   const std::uint32_t atOnce = countedSamplesFor(inputs.lattice.count, rules.budget);
-  // A rank's own lists get N_S each: a list's need is known only when all ranks' are together.
+  // A rank's own lists get N_S each: a list's need is known only when all ranks' parts of it are together.
   if (inputs.settings.budget == Budget::Total && !cutAtGaps) {
     SupersegmentHistogram histogram;
     for (int y = 0; y < height; y += stride) {

@@ -41,9 +41,8 @@ struct RayInputs {
 };
 
 /// The samples of the ray through the centre of pixel (x, y) that `blocks` own, front to back, including
-/// transparent ones, up to the one at which the ray reaches the termination opacity. `atOnce` takes only
-/// samples whose number is a multiple of it; each counts for that many. The blend mode is Composite or
-/// Isosurface.
+/// transparent ones, up to the one at which the ray reaches the termination opacity. Takes only samples whose
+/// number is a multiple of `atOnce`; each counts for that many. The blend mode is Composite or Isosurface.
 std::vector<Interval> castRay(const RayInputs& inputs, std::span<const Block> blocks, int x, int y,
                               std::uint32_t atOnce = 1);
 
@@ -52,7 +51,8 @@ std::vector<Interval> castRay(const RayInputs& inputs, std::span<const Block> bl
 std::optional<Projection::Extreme> projectRay(const RayInputs& inputs, std::span<const Block> blocks, int x,
                                               int y);
 
-/// DVR: the ground truth, in any blend mode. Depth as in Image; that of an extreme is where it first occurs.
+/// DVR: the ground truth, in any blend mode. Depths are as in Image; an extreme has the depth at which it
+/// first occurs.
 Image renderVolume(const RayInputs& inputs, std::span<const Block> blocks);
 
 /// The (sub-)VDI of these blocks, one list per pixel. SegmentRules describes `cutAtGaps`; pass false if these
@@ -72,8 +72,8 @@ SupersegmentLists composite(std::span<const SupersegmentLists> subLists, const G
 
 /// The VDI seen by `view`. Each supersegment fills the part of its pixel's frustum between its two depths;
 /// rays traverse the frusta of V_O's pixels in order, in any direction. `ends` has the depths at which the
-/// view's rays end, say at opaque objects: [height][width]; empty: nowhere. Only the sides that `planes` show
-/// are rendered.
+/// view's rays end, for example at opaque objects: [height][width]; empty: nowhere. Only the sides that
+/// `planes` show are rendered.
 Image render(const Vdi& vdi, const View& view, Reconstruction reconstruction,
              std::span<const float> ends = {}, std::span<const ClipPlane> planes = {});
 

@@ -20,8 +20,8 @@ struct ViewRay {
   double worldPerT = 1.0;  // world length per unit of t
 };
 
-/// Where the ray crosses the plane between pixel columns (or rows) at image coordinate `pixel`. In V_O's view
-/// space that plane is  p[axis] = slope * p.z (perspective) or p[axis] = slope (parallel).
+/// The t at which the ray crosses the plane between pixel columns (or rows) at image coordinate `pixel`. In
+/// V_O's view space that plane is  p[axis] = slope * p.z (perspective) or p[axis] = slope (parallel).
 double crossing(const ViewRay& ray, const View& view, int axis, int pixel) {
   const double extent = axis == 0 ? view.width() : view.height();
   const double slope = (pixel - 0.5 * extent) * 2.0 * view.halfHeight() / view.height();
@@ -71,12 +71,12 @@ Stretch insideFrustum(const ViewRay& ray, const View& view, double nearest, doub
   return stretch;
 }
 
-/// A VDI's lists, and how their faces lean.
+/// A VDI's lists, and the slopes of their faces.
 struct LeaningLists {
   const SupersegmentLists& lists;
-  std::vector<Slopes> slopes;  // empty: not at all
+  std::vector<Slopes> slopes;  // empty: faces do not slope
   float slopeUnit = 0.0F;
-  BoxFaces faces{};  // of the box in which they lie; all 0: of all space
+  BoxFaces faces{};  // of the box around the lists; all 0: of all space
 };
 
 /// The part of a ray's stretch that lies within a supersegment, as fractions of the stretch.
@@ -213,9 +213,9 @@ Accumulator intersectAlongLists(const LeaningLists& lists, const View& original,
   return sum;
 }
 
-/// Reconstruction::Smooth and Sheared. Goes column by column, or row by row if the ray crosses more of these.
-/// The ray then stays near the same two lists of each column, which are blended. Blending across columns as
-/// well gains nothing (measured), except where the ray crosses hardly any.
+/// Reconstruction::Smooth and Sheared. Goes column by column, or row by row if the ray crosses more rows. The
+/// ray then stays near the same two lists of each column, which are blended. Blending across columns as well
+/// gains nothing (measured), except where the ray crosses hardly any.
 Accumulator traverseSmoothly(const LeaningLists& lists, const View& original, const ViewRay& ray,
                              const Stretch& stretch) {
   const glm::dvec2 start = pixelAt(ray, original, stretch.enter);

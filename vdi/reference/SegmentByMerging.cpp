@@ -127,7 +127,7 @@ float amountOf(const PreSegment& preSegment) {
   return (preSegment.back - preSegment.front) * distance({}, preSegment.appearance);
 }
 
-/// Tolerances make equal lengths and amounts compare the same, however they were rounded.
+/// The factors make equal lengths and amounts compare the same, however they were rounded.
 Place placeOf(const PreSegment& a, const PreSegment& b) {
   const float lengths = (a.back - a.front) + (b.back - b.front);
   if (b.front - a.back < lengths * 0.9999F) return Place::OfBoth;
@@ -145,8 +145,8 @@ PreSegment merged(const PreSegment& a, const PreSegment& b) {
   return result;
 }
 
-/// The change by merging two neighbours: the sum over both, and over the gap between them, of the distance to
-/// the merged material, times the length.
+/// The change that merging two neighbours makes: the sum over both, and over the gap between them, of the
+/// distance to the merged material, times the length.
 float costOf(const PreSegment& a, const PreSegment& b) {
   if (b.cut) return unlimited;
   const float first = a.back - a.front;
@@ -212,7 +212,7 @@ Costs mergeOnce(std::vector<PreSegment>& preSegments, std::size_t excess, float 
     if (excess > 0 && costs[i] < unlimited && costs[i] <= limit && isCheapest(costs, i)) {
       left.push_back(merged(preSegments[i], preSegments[i + 1]));
       --excess;
-      ++i;  // its cost is not the least, or it would have merged
+      ++i;  // the absorbed neighbour's own merger is not made
     } else {
       left.push_back(preSegments[i]);
     }
@@ -245,7 +245,8 @@ std::size_t visibleSamples(std::span<const Interval> intervals, std::size_t atOn
                                     [](const Interval& interval) { return interval.opticalDepth > 0.0F; }));
 }
 
-/// The number that a list with visible intervals would have at a level of a SupersegmentHistogram.
+/// The number of supersegments that a list with visible intervals would have at a level of a
+/// SupersegmentHistogram.
 std::size_t supersegmentsAtLevel(std::span<const Interval> intervals, const SegmentRules& rules,
                                  std::size_t atOnce, std::size_t level) {
   std::size_t count = 1;
@@ -257,7 +258,7 @@ std::size_t supersegmentsAtLevel(std::span<const Interval> intervals, const Segm
   return std::min<std::size_t>(count, maxPerList(rules.budget, Budget::Total));
 }
 
-/// The number that a list with visible intervals may have, apart from runs.
+/// The number of supersegments that a list with visible intervals may have, apart from runs.
 std::size_t budgetOf(std::span<const Interval> intervals, const SegmentRules& rules, std::size_t atOnce,
                      float rounding) {
   if (rules.level < 0.0F) return rules.budget;
@@ -376,7 +377,7 @@ ListTolerance agreedToleranceBetween(std::span<const ListTolerance> counted, std
   for (const ListTolerance& a : counted) {
     if (a.tolerance == 0.0F) continue;
     known.push_back(a);
-    // Ranks without material in a list where others have some find the same tolerance.
+    // Ranks without material in the list must find the same tolerance as ranks with some.
     known.back().preSegments = std::max(a.preSegments, 1U);
     maxCount.preSegments = std::max(maxCount.preSegments, a.preSegments);
     maxCount.quota = std::max(maxCount.quota, a.quota);

@@ -52,7 +52,7 @@ std::vector<Supersegment> segmentWithSensitivity(std::span<const Interval> inter
 /// Number of runs: pieces of visible material between gaps.
 std::size_t countRuns(std::span<const Interval> intervals);
 
-/// Searches the sensitivity of a list:
+/// Searches for the sensitivity of a list:
 ///   * The list may hold max(budget, runs) supersegments. Runs are the pieces that gaps force apart (1
 ///     without cutAtGaps).
 ///   * If there are no more visible intervals than that, each becomes a supersegment of its own: nothing is
@@ -88,7 +88,7 @@ std::vector<Supersegment> segmentByBisection(std::span<const Interval> intervals
 ///      as always merging the cheapest pair, and it does not search a list again for each merger.)
 /// One pass along the ray counts all tolerances side by side, so a device needs two passes in all
 /// (Budget::Total takes one more, for its SupersegmentHistogram). Where no gaps must be kept, only one ray of
-/// countedStride x countedStride is counted, see ListTolerance.
+/// countedStride x countedStride is counted (see ListTolerance).
 using shared::finestTolerance;
 using shared::hiddenWeight;
 using shared::preSegmentsPerBudget;
@@ -104,8 +104,8 @@ struct ListTolerance {
   float tolerance = -1.0F;  // negative: each interval is a pre-segment
   std::uint32_t preSegments = 0;
   std::uint32_t room = 0;  // >= preSegments + sparePreSegments, or 0 for a list known to be empty
-  /// With other ranks (agreedTolerance): how many supersegments the list may become, apart from runs, and how
-  /// many runs are expected. Pre-segments that begin a run take no room. 0: the rules' budget.
+  /// With other ranks (agreedTolerance): the number of supersegments that the list may have, apart from runs,
+  /// and the number of runs expected. Pre-segments that begin a run take no room. 0: the rules' budget.
   std::uint32_t quota = 0;
   std::uint32_t runs = 0;
   bool operator==(const ListTolerance&) const = default;

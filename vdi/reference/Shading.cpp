@@ -9,7 +9,7 @@ namespace vdi::reference {
 
 namespace {
 
-/// Zero also if one of the values is not finite.
+/// The difference; zero if it counts as rounding, or if a value is not finite.
 double differenceOf(double ahead, double behind) {
   const double difference = ahead - behind;
   const double least = leastGradient * (std::abs(ahead) + std::abs(behind));

@@ -45,8 +45,8 @@ Run runFrom(std::span<const Supersegment> list, std::size_t first) {
   return run;
 }
 
-/// The run that overlaps [front, back] most, or the nearest one within maxSlope footprints. Begins at `from`,
-/// and sets it to the run's first supersegment. Without one, opticalDepth is negative.
+/// The run that overlaps [front, back] most, or the nearest one within maxSlope footprints. The search begins
+/// at `from`, and sets it to the run's first supersegment. If no run is found, opticalDepth is negative.
 Run runBeside(std::span<const Supersegment> list, float front, float back, float footprint,
               std::size_t& from) {
   const float reach = renderMaxSlope * footprint;
@@ -74,7 +74,7 @@ class Walk {
     at_ = run_.first;
     before_ = 0.0F;
   }
-  /// The depth that has this optical depth in front of it; nowhere: the run has less.
+  /// The depth that has this optical depth in front of it; `nowhere` if the run has less.
   float placeOf(float opticalDepth) {
     while (at_ < run_.last && before_ + depthOf(list_[at_]) < opticalDepth) before_ += depthOf(list_[at_++]);
     const Supersegment& segment = list_[at_];
@@ -157,8 +157,8 @@ void fade(std::span<const Supersegment> list, float footprint, std::span<Slopes>
   }
 }
 
-/// Where a ray enters and leaves the box: depths, and how fast it goes through the faces there, as distance
-/// from the face per depth.
+/// The depths at which a ray enters and leaves the box, and its rates there: distance from the face per
+/// depth.
 struct Passage {
   double enter = -std::numeric_limits<double>::infinity();
   double leave = std::numeric_limits<double>::infinity();

@@ -1,4 +1,4 @@
-// How the faces of supersegments lean: Reconstruction::Sheared. The shaders' twin is shaders/slopes.glsl.
+// The slopes of supersegments' faces, for Reconstruction::Sheared. The shaders' twin is shaders/slopes.glsl.
 #pragma once
 
 #include <cstdint>
@@ -11,8 +11,8 @@
 namespace vdi::reference {
 
 /// Change of depth of a supersegment's front and back from one list to the next in x and in y, in units of
-/// `SlopeUnit`. 0 at both: the supersegment ends at the same depths all over its pixel. onFace at both: a
-/// list begins or ends there on a face of the box, and reaches to that face all over its pixel.
+/// `SlopeUnit`. 0 in both: the supersegment ends at the same depth all over its pixel. onFace in both: a list
+/// begins or ends there on a face of the box, and reaches to that face all over its pixel.
 struct Slopes {
   static constexpr std::int8_t onFace = -128;
 
@@ -42,11 +42,12 @@ ListBox listBoxOf(const Vdi& vdi, float farthest);
 /// The slopes of all supersegments, [lists.segments.size()]. For each of the four lists beside a list:
 ///   1. A run, supersegments that touch each other, belongs to the neighbour's run that it overlaps most, or
 ///      that is nearest within maxSlope footprints.
-///   2. A face is where the neighbour's run has the same optical depth in front of it, for faces in the
-///      front half of their run's optical depth; behind it, for the others. A face without such a place
+///   2. A face in the front half of its run's optical depth continues where the neighbour's run has the same
+///      optical depth in front; another face, where that run has the same behind. A face without such a place
 ///      within maxSlope footprints has no slope towards that neighbour.
 ///   3. The slope along an axis is the mean of both neighbours', or that of one if the other has none.
-/// It fades out for material whose opacity over a footprint is below twice leastOpacity: haze has no faces.
+/// Slopes fade out for material whose opacity over a footprint is below twice leastOpacity: haze has no
+/// faces.
 ///
 /// A list's first front and last back are on a face if the list's ray enters or leaves the box there.
 std::vector<Slopes> slopesOf(const SupersegmentLists& lists, const View& original, const SlopeUnit& unit,
