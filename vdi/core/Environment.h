@@ -12,7 +12,7 @@ namespace vdi {
 struct EnvironmentVariable {
   const char* name;     // VDI_...
   const char* values;   // the valid values, for messages and help
-  const char* meaning;  // one sentence, without a full stop
+  const char* meaning;  // a phrase, without a full stop
   bool forUsers;        // false: for tests and measurements
 };
 

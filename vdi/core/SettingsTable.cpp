@@ -114,7 +114,7 @@ constexpr std::array tableRows{
          .property = "Precision",
          .key = "precision",
          .help = "form of a supersegment: compact, 8 bytes, accurate to 1/255 from the VDI's viewpoint, "
-                 "highlights apart; full, 24 bytes of floats"}),
+                 "except in highlights; full, 24 bytes of floats"}),
     row<&GenerateSettings::terminationOpacity>(
         {.name = "termination opacity",
          .property = "TerminationOpacity",

@@ -182,7 +182,7 @@ DeviceCandidate inspect(VkPhysicalDevice device) {
   if (properties.apiVersion >= VK_API_VERSION_1_3) {
     inspectFeatures(device, candidate);
   } else {
-    summary.refusals.push_back(fmt::format("Vulkan {}.{}, 1.3 is needed",
+    summary.refusals.push_back(fmt::format("Vulkan {}.{}, but 1.3 is needed",
                                            VK_API_VERSION_MAJOR(properties.apiVersion),
                                            VK_API_VERSION_MINOR(properties.apiVersion)));
   }

@@ -91,7 +91,7 @@ ValueMap valueMapOf(const Block& block) {
   if (range.min < -maximum || range.max > maximum) {
     throw Error(
         ErrorCode::InvalidArgument,
-        fmt::format("a block of {} has values from {} to {}, those beyond {} in size can't be handled; "
+        fmt::format("a block of {} has values from {} to {}; magnitudes beyond {} can't be handled, so "
                     "use other units",
                     toString(block.type), range.min, range.max, maximum));
   }
