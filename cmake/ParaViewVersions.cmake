@@ -13,7 +13,7 @@
 # paraview-dev. That package names vtkmodules/X.so, but python3-paraview has
 # X.cpython-313-x86_64-linux-gnu.so. CMake checks that every exported file exists and refuses the
 # package, although nothing here links to these modules. CMake skips this check for a target that it
-# takes for an Apple XCFramework. The function marks each module so that exists under its longer
+# takes for an Apple XCFramework. The function thus marks each module that exists under its longer
 # name. CMake still refuses a module that is missing.
 function(vdi_pass_over_python_modules folder)
   file(GLOB exports "${folder}/vtk/VTKPython-targets-*.cmake" "${folder}/ParaViewPython*-targets-*.cmake")

@@ -7,7 +7,7 @@ set(cmakeDir "${CMAKE_INSTALL_LIBDIR}/cmake/pv-vdi")
 set(pkgConfigDir "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
 
 # vdi_install_pkg_config(<name>): installs cmake/<name>.pc.in. The file finds the prefix from its
-# own place.
+# own path.
 function(vdi_install_pkg_config name)
   file(RELATIVE_PATH toPrefix "/prefix/${pkgConfigDir}" /prefix)
   string(REGEX REPLACE "/$" "" toPrefix "${toPrefix}")

@@ -10,8 +10,8 @@ find_program(SPIRV_OPT spirv-opt REQUIRED)
 #   std::span<const std::uint32_t> <namespace>::shaderCode(std::string_view name)
 # for those names. A shader of PROGRAMS is compiled once for each number from 0 to count - 1, with PROGRAM defined to it, as
 # <name>_<number>, and again as <name>_<number>_pruned, without the code of the other programs. Mesa takes several times as
-# long to remove that; NVIDIA's driver makes slower code of what is left, by 6 % in one program. The default namespace is
-# vdi::gpu. The build tracks includes: a changed header recompiles only the shaders that use it.
+# long to remove that code; NVIDIA's driver makes slower code from a pruned shader, by 6 % in one program. The default
+# namespace is vdi::gpu. The build tracks includes: a changed header recompiles only the shaders that use it.
 function(vdi_embed_shaders target folder)
   cmake_parse_arguments(PARSE_ARGV 2 arg "" "NAMESPACE" "SHADERS;PROGRAMS")
   set(namespace "${arg_NAMESPACE}")
