@@ -3,7 +3,7 @@
 #define VDI_APPEARANCE_GLSL
 #include "optical.glsl"
 
-// Premultiplied colour and opacity that `opticalDepth` over `length` has over one sample.
+// Premultiplied colour and opacity over one sample, of material with `opticalDepth` over `length`.
 vec4 appearanceOf(vec3 color, float opticalDepth, float length, float sampleStep) {
   float whole = opacityOf(opticalDepth);
   float part = opacityOf(opticalDepth * sampleStep / length);

@@ -14,8 +14,8 @@ const bool showsIsosurfaces = blendMode == blendIsosurface;
 float beginOf(uint k);
 float endOf(uint k);
 
-// The extreme scalar so far, as a position in the transfer table, negated to find the smallest; and where it
-// first occurs.
+// The extreme scalar so far, as a position in the transfer table, negated to find the smallest; and the depth
+// at which it first occurs.
 const float noExtreme = -3.402823466e38;
 float extreme;
 float extremeDepth;
@@ -24,7 +24,7 @@ float extremeOf(float position) { return blendMode == blendMinimum ? -position :
 
 void project(float position, float place) {
   float value = extremeOf(position);
-  if (!(value > extreme)) return;  // NaN isn't
+  if (!(value > extreme)) return;  // NaN never is
   extreme = value;
   extremeDepth = params.first + place * params.step;
 }

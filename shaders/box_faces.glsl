@@ -1,4 +1,4 @@
-// Where the rays of V_O's picture enter and leave the VDI's box. Twin of passageOf in
+// The depths at which the rays of V_O's picture enter and leave the VDI's box. Twin of passageOf in
 // vdi/reference/Slopes.cpp.
 //
 // Needs: shared/render.h; push.

@@ -8,7 +8,7 @@
 #extension GL_KHR_shader_subgroup_shuffle : require
 #include "shared/cast.h"
 
-// One-dimensional, so that the invocations that share a ray are adjacent in one subgroup.
+// The workgroup is one-dimensional, so that the invocations that share a ray are adjacent in one subgroup.
 layout(local_size_x = castGroupX * castGroupY) in;
 // The program's purpose. The build makes a module of each program, and for CPU devices another one without
 // the code of the other programs.
@@ -18,8 +18,8 @@ layout(constant_id = 1) const uint pageCount = 1;
 // the longest. Each takes its share of the samples, and counts for its share of the tolerances.
 layout(constant_id = 4) const uint lanesPerRay = 1;
 uint rayLane = 0u;
-// Constants, because their registers are live along the whole ray: whether supersegments must end at gaps;
-// and whether a list gets the number that it needs (CastParams::level).
+// These are constants, because variables would occupy registers along the whole ray: whether supersegments
+// must end at gaps; and whether a list gets the number that it needs (CastParams::level).
 layout(constant_id = 5) const bool cutAtGaps = false;
 layout(constant_id = 6) const bool byNeed = false;
 

@@ -1,5 +1,5 @@
-// Computes each macrocell's range of values when blocks arrive, and whether any of these is visible when
-// blocks or the transfer table change. The rays of cast.comp skip macrocells without visible values.
+// Computes each macrocell's range of values when blocks arrive, and its visibility when blocks or the
+// transfer table change. The rays of cast.comp skip macrocells without visible values.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/cast.h"
@@ -49,7 +49,7 @@ shared uint minimum;
 shared uint minInverted;
 shared uint infinite;  // bit 0: +infinity occurs, bit 1: -infinity occurs
 
-// Measures a cell by a workgroup, whose invocations each take a row of texels at a time.
+// Measures a cell with a workgroup, whose invocations each take a row of texels at a time.
 void measure(CellPiece piece, uint pieceIndex, uint cell) {
   uint index = cell - piece.firstCell;
   uvec3 cellAt = uvec3(index % piece.cellDims.x, (index / piece.cellDims.x) % piece.cellDims.y,

@@ -1,4 +1,5 @@
-// Segments interleaved lists again, to at most N_S supersegments each; their intervals are sub-supersegments.
+// Segments interleaved lists again, to at most N_S supersegments each. The intervals of these lists are
+// sub-supersegments.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/composite.h"

@@ -47,7 +47,7 @@ PreSegmentCounter beginCounter() {
   return counter;
 }
 
-// Ends the pre-segments that material `x` of that weighted length makes deviate too much.
+// Ends the pre-segments that deviate too much because of material `x` of that weighted length.
 void deviate(inout PreSegmentCounter counter, vec4 x, float weightedLength) {
   float tolerance = counter.finest;
   uint beyond = 0u;
@@ -105,7 +105,7 @@ uint preSegmentsAt(uint tolerance, uint otherwise) {
   return result;
 }
 
-// The list's number of supersegments at a level of the histogram, if it has any. Twin of
+// The list's number of supersegments at a level of the histogram, if the list has any. Twin of
 // supersegmentsAtLevel in vdi/reference/SegmentByMerging.cpp.
 uint supersegmentsAtLevel(ListProgress progress, uint level) {
   return min(preSegmentsAt(level - 1u, level == 0u ? progress.visible : 1u), params.maxPerList);

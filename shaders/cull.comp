@@ -67,7 +67,8 @@ Reach reachOf(RayPacket packet) {
   vec4 depthsOut = originZ + stretch.y * directionZ;
   Reach reach =
       Reach(stretch.x, stretch.y, vec2(0.0), vec2(params.lists), vec2(params.nearest, params.farthest));
-  // Otherwise the bounds stay those of the whole picture: points beside V_O's eye project without bounds.
+  // If this fails, the bounds stay those of the whole picture: points beside V_O's eye project without
+  // bounds.
   const float finite = 1e30;
   if (stretch.y < finite && (parallel || min(minimum(depthsIn), minimum(depthsOut)) > 0.0)) {
     vec4 pixelsIn = 1.0 / (params.pixelSize * (parallel ? vec4(1.0) : depthsIn));
@@ -109,7 +110,7 @@ uint placesToIntersect(RayPacket packet) {
   ivec2 tiles = lastTile - firstTile + 1;
   const int few = 16;
   if (tiles.x * tiles.y <= few) {
-    // Rays that hardly move in the picture: all tiles.
+    // Rays that hardly move in the picture may meet all of these tiles.
     if (own >= tiles.x * tiles.y) return 0u;
     ivec2 tile = firstTile + ivec2(own % tiles.x, own / tiles.x);
     return countOf(tileDepthMask(renderTile, tile) & maskBetween(reach.depths.x, reach.depths.y));

@@ -2,8 +2,8 @@
 // particle over one block.
 //
 // Sums are integers, so their order doesn't matter, and runs are the same bit for bit. They have 64 bits in
-// two words, because not all devices have atomics of 64 bits: adding to the lower word tells whether it
-// overflows.
+// two words, because not all devices have atomics of 64 bits: the result of adding to the lower word shows
+// whether it overflows.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/deposit.h"
@@ -34,7 +34,7 @@ float spline(float q) {
   return 0.25 * outer * outer * outer - inner * inner * inner;
 }
 
-// `offset`: from the position's cell to another one.
+// The share of the cell at `offset` from the position's cell.
 float shareAt(DepositParticle particle, ivec3 offset) {
   vec3 first = vec3(offset);
   if (particle.mode == depositModeCloud) {
@@ -66,8 +66,8 @@ float sumOfShares(DepositParticle particle) {
   return sum;
 }
 
-// One loop instead of nested ones: lanes of a CPU device, whose boxes differ, run as often as the largest
-// box has cells, and lavapipe ends all loops of an invocation after 65535 passes.
+// One loop replaces nested ones: on a CPU device, lanes with different boxes run as often as the largest box
+// has cells, and lavapipe ends all loops of an invocation after 65535 passes.
 void main() {
   uint index = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * depositGroup;
   if (index >= push.count) return;

@@ -1,4 +1,5 @@
-// Converts an integer below 2^23 by way of its mantissa. On a GPU that is faster than a conversion.
+// Converts an integer below 2^23 to a float by setting the mantissa, which is faster on a GPU than a
+// conversion.
 #ifndef VDI_EXACT_GLSL
 #define VDI_EXACT_GLSL
 

@@ -55,8 +55,8 @@ void findBins() {
       floatBitsToUint(farthest > nearest ? float(renderBins) / (farthest - nearest) : 0.0);
 }
 
-// How far a leaning face moves in a list. Rays are intersected with a list up to half a list from its middle
-// along one axis, and one and a half lists along the other.
+// The distance by which a leaning face moves within a list. Rays are intersected with a list up to half a
+// list from its middle along one axis, and one and a half lists along the other.
 float reachOf(vec2 slopes) { return 1.5 * max(slopes.x, slopes.y) + 0.5 * min(slopes.x, slopes.y); }
 
 void maskList(uint list, uint first, uint count, bool leans) {
@@ -73,8 +73,8 @@ void maskList(uint list, uint first, uint count, bool leans) {
     RenderSegment segment = segments.at[i];
     vec4 slopes = leans ? segmentSlopes(slopesOfList.at[i]) : vec4(0.0);
     vec2 ends = vec2(segment.front, segment.back);
-    // An end on a face doesn't count as reach: it's a list's first front or last back, and all intersections
-    // that come that far look at these.
+    // An end on a face doesn't count as reach: it is the list's first front or last back, and every
+    // intersection that comes so far looks at it.
     if (frontIsOnFace(slopes)) {
       ends.x = clamp(faceDepthsAround(boxPassage(pixel).enter, pixel).x, nearest, ends.x);
     } else {
@@ -94,7 +94,7 @@ void maskList(uint list, uint first, uint count, bool leans) {
   push.heads.at[list] = ListHead(first, count | uint(ceil(reach / listReachUnit)) << listCountBits, mask);
 }
 
-// Includes the lists around the tile, which smooth reconstruction uses within the tile.
+// The mask includes the lists around the tile, which smooth reconstruction uses within the tile.
 void maskTile(ivec2 tile, uint index) {
   uint64_t mask = 0ul;
   ivec2 begin = max(tile * renderTile - 1, ivec2(0));

@@ -79,7 +79,7 @@ float coil(vec3 p) {
     float spineZ = 0.3 * sin(6.0 * along);
     float d = length(vec2(r - spineR, q.z - spineZ));
     float wall = exp(-square((d - 0.05) / 0.008));
-    // The angle is small, so GPUs are exact.
+    // The angle is kept small, so that GPUs compute its cosine exactly.
     float ribs = 0.5 + 0.5 * cos(2.0 * pi * fract(along * 60.0));
     best = max(best, max(wall * ribs, exp(-square(d / 0.012))));
   }

@@ -1,6 +1,6 @@
 // Puts the ranks' sub-supersegments of each list in order of depth, or composites them to one colour. Each
-// rank's are in order already, and no two overlap, so the next one is the nearest among the heads of the
-// ranks that have any left.
+// rank's supersegments are in order already, and no two overlap, so the next one is the nearest of the ranks'
+// remaining heads.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/composite.h"
@@ -26,7 +26,7 @@ vec2 depthsOf(uint i) {
   return vec2(segment.front, segment.back);
 }
 
-// If two depths have rounded to one code, the one that ends first comes first.
+// If two fronts were rounded to one code, the supersegment that ends first comes first.
 bool isNearer(vec2 a, vec2 b) { return a.x < b.x || (a.x == b.x && a.y < b.y); }
 
 void copySegment(uint i, uint slot) {
@@ -113,7 +113,7 @@ void interleaveList(uint list) {
     InterleaveHead head = headOf(begin, stop);
     if (heads == 0u) one = head;
     if (heads == 1u) two = head;
-    // No more ranks have supersegments than there are supersegments.
+    // The heads fit, because each of these ranks has at least one supersegment.
     if (heads >= 2u) push.heads.at[first + heads] = head;
     ++heads;
   }

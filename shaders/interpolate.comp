@@ -30,7 +30,7 @@ Counted countedAt(uint x, uint y) {
 }
 
 void consider(Counted counted) {
-  // All ranks find the same tolerance, including those without material in a list where others have some.
+  // All ranks must find the same tolerance, including those without material in the list.
   if (together ? counted.tolerance == 0.0 : counted.preSegments == 0u) return;
   maxQuota = max(maxQuota, counted.quota & 0xffffu);
   maxRuns = max(maxRuns, counted.quota >> 16);

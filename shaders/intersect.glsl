@@ -31,7 +31,7 @@ struct Intersection {
 
 const Intersection nothing = Intersection(vec4(0.0), infinity);
 
-// A supersegment, and how its faces lean.
+// A supersegment, and the slopes of its faces.
 struct Leaning {
   uvec4 segment;
   uint slopes;
@@ -42,7 +42,7 @@ vec2 inMetOrder(vec2 depths) { return rayAscends ? depths : -depths.yx; }
 // The two depths in the list's middle, in that order.
 vec2 metDepths(Leaning of) { return inMetOrder(segmentDepths(of.segment)); }
 
-// Depths of its faces at an offset from the list's centre. A face of the box ends the ray itself.
+// Depths of the faces at an offset from the list's centre. A face of the box ends the ray itself.
 vec2 leaningDepths(Leaning of, vec4 slopes, vec2 offset) {
   vec4 change = slopes * params.slopeUnit;
   vec2 depths = segmentDepths(of.segment) + vec2(dot(change.xy, offset), dot(change.zw, offset));
@@ -54,7 +54,7 @@ struct Part {
   float low;  // depths
   float high;
   float slant;  // length of the ray relative to the list's own, between two depths
-  // Where it begins and ends in V_O's picture, from the list's centre; for Reconstruction::Sheared.
+  // Its ends in V_O's picture, relative to the list's centre; for Reconstruction::Sheared.
   vec2 begin;
   vec2 end;
 };
@@ -115,7 +115,7 @@ void meet(inout Seen seen, Leaning of, Part part) {
 Intersection intersectionOf(Seen seen)
     { return Intersection(vec4(seen.light * segmentColorUnit, 1.0 - seen.transmittance), seen.entered); }
 
-RenderSegmentWords listSegments;  // the current list's
+RenderSegmentWords listSegments;  // of the current list
 UintArray listSlopes;
 
 // The i-th of several supersegments from a slot on, of which `more` follow in the list; beyond these, the
@@ -132,13 +132,13 @@ int useList(ListHead head) {
   return int(segmentCount(head)) - 1;
 }
 
-// How far the list's leaning faces reach beyond their depths in its middle.
+// The distance by which the list's leaning faces reach beyond their depths in its middle.
 float reachOf(ListHead head) {
   if (!shearedReconstruction) return 0.0;
   return float(head.countAndReach >> listCountBits) * (listReachUnit * params.slopeUnit);
 }
 
-// An intersection's position in a list: at segmentsAtOnce supersegments.
+// An intersection's position in a list: segmentsAtOnce adjacent supersegments.
 struct Cursor {
   int place;  // index of the first of them, in the order in which the ray meets them
   uint slot;  // its slot in the list

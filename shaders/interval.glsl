@@ -16,7 +16,7 @@ struct Interval {
 
 struct ListProgress {
   float before;         // transmittance of all intervals so far
-  float reach;          // end of the last one
+  float reach;          // end of the last interval
   float stepsPerDepth;  // 1 / length of a sample
   uint samplesAtOnce;   // samples that an interval represents
   uint visible;         // visible samples

@@ -1,6 +1,6 @@
 // A ray's path through V_O's picture: straight, from column to column of lists, or from row to row if it
-// crosses more of these. Either is called a column here, and the lists along it are its rows. Progress is
-// counted in columns from the start, or as a fraction of the ray's stretch.
+// crosses more rows. Either is called a column here, and the lists along it are its rows. Progress is counted
+// in columns from the start, or as a fraction of the ray's stretch.
 //
 // The program provides params and ray.
 #ifndef VDI_LINE_GLSL

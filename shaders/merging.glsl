@@ -13,7 +13,7 @@ float amountOf(StoredPreSegment preSegment, vec4 appearance) {
   return (preSegment.span.y - preSegment.span.x) * differenceOf(vec4(0.0), appearance);
 }
 
-// Where the merged pre-segment lies: in the place of both, of the first, or of the second one.
+// The place of the merged pre-segment: that of both, of the first, or of the second one.
 const uint placeOfBoth = 0u;
 const uint placeOfFirst = 1u;
 const uint placeOfSecond = 2u;

@@ -9,7 +9,7 @@
 
 struct RayPacket {
   vec2 first;   // position of the rays of its first column and row
-  vec2 extent;  // distance from there to the last ones
+  vec2 extent;  // distance from there to those of the last column and row
 };
 
 // The packet of a square of pixels, clipped to the picture.

@@ -57,8 +57,8 @@ ListState beginCounting(uint samplesAtOnce) {
   return ListState(progressAtFront(samplesAtOnce), beginCounter(), idleWriter());
 }
 
-// Stores the counts in the form that the program is for. If it fills the histogram, all invocations
-// of a workgroup must call this, including those without a list, and clearGroupHistogram before.
+// Stores the counts in the program's form. If it fills the histogram, all invocations of a
+// workgroup must call this, including those without a list, and clearGroupHistogram before.
 void endCounting(ListState list, uint index, bool hasList) {
   if (fillsHistogram) {
     addToHistogram(list.progress, list.counter, hasList);

@@ -41,7 +41,7 @@ void main() {
   uint quota = 0u;
   if (countOf(sum, 0u) > 0u) {
     uint room = preSegmentsPerBudget * push.budget;
-    // All ranks' runs may exceed that; each rank then keeps its own.
+    // All ranks' runs together may exceed the room; each rank then keeps its own.
     tolerance = unlimited;
     uint place = countedRuns;
     if (countOf(sum, 0u) <= push.budget) {

@@ -13,7 +13,7 @@ float rayOpticalDepth;   // so far
 uvec2 rayScene;          // samples [x, y) lie in the visible part: the scene's bounds, or a region of it
 float rayEnter;          // depth where the ray enters the visible part, and where it leaves it
 float rayLeave;
-float rayBegin;  // the same as places
+float rayBegin;  // rayEnter and rayLeave as places
 float rayEnd;
 // Distance from a sample's start to the point that decides its owner: 0.5, except for rays that graze the
 // scene
@@ -33,8 +33,8 @@ void setUpRay(uint x, uint y) {
   rayLengthOfDepth = length(direction);
 }
 
-// A place on the ray counts samples: k is the start of sample k, k + 0.5 its middle. `precise`, because every
-// rank and every pass must find the same position for a place, since ownership depends on it.
+// A place on the ray counts samples: k is the start of sample k, k + 0.5 its middle. `precise` makes every
+// rank and every pass find the same position for a place, because ownership depends on it.
 vec3 positionAt(float place) {
   precise float depth = place * params.step;
   precise vec3 position = rayStart + depth * rayDirection;
@@ -50,7 +50,7 @@ bool contains(vec3 lo, vec3 hi, vec3 p) { return all(greaterThanEqual(p, lo)) &&
 // Samples [first, last) of the ray that the box owns. They form one range because each coordinate is monotone
 // along the ray.
 uvec2 samplesIn(vec3 lo, vec3 hi) {
-  // First the part of the ray in the box, in units of samples and with a margin for rounding; then exactly,
+  // Finds the part of the ray in the box, in units of samples and with a margin for rounding; then narrows it
   // sample by sample. Vectors are never indexed by a variable here: lavapipe (Mesa 22.3) mixes up the
   // components when lanes diverge.
   bvec3 across = equal(rayDirection, vec3(0.0));
@@ -70,12 +70,14 @@ uvec2 samplesIn(vec3 lo, vec3 hi) {
   return uvec2(first, last);
 }
 
-// The bounds of the visible part, the scene's or a region's, seldom lie half-way between two samples. The
-// outermost samples represent what is really there: the first one's interval starts where the ray enters, the
-// last one's ends where it leaves. This depends on the ray, the scene and the region alone, so it is the same
-// on every rank. Without it, the faces of a filled box show the sample lattice as stripes.
+// The bounds of the visible part (scene or region) seldom lie half-way between two samples. The outermost
+// samples represent what is really there: the first one's interval starts where the ray enters, the last
+// one's ends where it leaves. With whole samples, the faces of a filled box would show the sample lattice as
+// stripes. The intervals depend on the ray, the scene and the region alone, so they are the same on every
+// rank.
+//
 // If a ray leaves the bounds before it reaches the middle of any sample, the part between is one sample, and
-// its middle decides its owner. Without this, the edges of a filled box are jagged.
+// its middle decides its owner. Without this sample, the edges of a filled box would be jagged.
 void setUpScene() {
   rayMiddle = 0.5;
   rayScene = samplesIn(params.sceneLo, params.sceneHi);
@@ -105,7 +107,8 @@ void setUpScene() {
   rayEnter = params.first + (grazes ? enter : clamp(enter, first - params.step, first));
   rayLeave = params.first + (grazes ? leave : clamp(leave, last, last + params.step));
   rayLeave = max(rayLeave, rayEnter + 0.001 * params.step);
-  // No block has values farther away, so the picture would depend on which block owns the sample.
+  // No block has values farther away. Without this limit, the picture would depend on which block owns the
+  // sample.
   vec3 size = abs(rayDirection);
   float reach = max(params.reach / max(max(size.x, size.y), size.z), 0.5);
   rayBegin = max((rayEnter - params.first) / params.step, middleOf(rayScene.x) - reach);
@@ -186,8 +189,8 @@ float endOf(uint k) { return mix(middleOf(k), beginOf(k + 1u), params.slabs != 0
 // Uses a ray's intervals one by one; within a brick they leave no gaps.
 void useSample(float front, float back, Sample it);
 
-// Texels requested at a time, and then slabs: for a GPU, waiting for one takes as long as waiting for all.
-// It must be 1 if samplesAtOnce is not.
+// Number of texels, and then of slabs, requested at a time: a GPU waits for one as long as for all. It must
+// be 1 if samplesAtOnce is not.
 layout(constant_id = 3) const uint samplesAhead = 1;
 
 // Number of samples used as one: more than 1 while pre-segments are counted (CastParams::countedSamples).
@@ -212,7 +215,7 @@ void projectSamples(Brick brick, uint begin, uint end) {
   }
 }
 
-// Uses samples [emptyBegin, begin) as one transparent one, if there are any; the result is the same. Then
+// Uses samples [emptyBegin, begin) as one transparent sample, if there are any; the result is the same. Then
 // uses the multiples of samplesAtOnce in [begin, end). Returns false once the ray is opaque enough.
 bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
   if (projects) {
@@ -280,8 +283,8 @@ bool castBrick(uint index) {
       if (stretch.visible) break;
       k = min(stretch.end, range.y);
     }
-    // Continues as long as cells are visible. Short gaps do not stop it, because rays that stop at different
-    // places wait for each other.
+    // Continues as long as cells are visible. Short gaps do not stop the loop, because rays that stop at
+    // different places wait for each other.
     uint end = min(stretch.end, range.y);
     for (uint next = end; next < range.y && next < end + shortGap; next = min(stretch.end, range.y)) {
       stretch = cellAt(brick, next, cellsPerSample);

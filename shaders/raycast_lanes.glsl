@@ -19,7 +19,7 @@ Sample sampleOfLane(Sample own, uint lane) {
                 subgroupShuffle(own.opacity, from), subgroupShuffle(own.overStep, from));
 }
 
-// Samples [begin, end), as castSamples; adjacent transparent ones are used as one.
+// Uses samples [begin, end) as castSamples does; adjacent transparent ones count as one.
 bool castLanes(Brick brick, uint begin, uint end) {
   uint unused = usedFrom(begin);
   // Cells are read until one of them has something visible, and again when no sample has.

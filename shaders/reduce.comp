@@ -1,6 +1,6 @@
 // Merges the pre-segments of lists that have too many, in rounds, until they fit. Twin of mergeCheapest in
-// vdi/reference/SegmentByMerging.cpp. One invocation a list, which streams through its pre-segments; for
-// devices and lists that reduce_subgroup.comp does not support.
+// vdi/reference/SegmentByMerging.cpp. One invocation streams through the pre-segments of a list. This program
+// is for devices and lists that reduce_subgroup.comp does not support.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/reduce.h"
@@ -117,7 +117,7 @@ void main() {
     if (costsFinite == 0.0) break;  // only cuts are left, and these do not exceed the limit
     uint before = count;
     count = mergeOnce(count, count - maxCount, limitOf(costSum, costsFinite));
-    // As in reduce_subgroup.comp.
+    // This stops as in reduce_subgroup.comp.
     if (isStuck && count == before) break;
     isStuck = count == before;
   }

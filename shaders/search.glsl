@@ -58,8 +58,8 @@ SearchResult searchList(bool write, float known, uint budget) {
   SearchResult best = SearchResult(largestSensitivity, 0u);
   float sensitivity = write ? known : smallestSensitivity;
   // Try 0 is the first one, try 1 the one that always fits, and the others bisect. A single loop has only one
-  // copy of feedIntervals. It ends by its condition alone: with jumps out of it, some programs never end on
-  // lavapipe of Mesa 26.1.
+  // copy of feedIntervals. The loop ends by its condition alone: if code jumps out of it, some programs never
+  // end on lavapipe of Mesa 26.1.
   int tries = write ? 1 : maxTries + 2;
   bool done = false;
   for (int i = 0; i < tries && !done; ++i) {

@@ -8,8 +8,8 @@
 // Whether colours are shaded; without shading its code costs nothing.
 layout(constant_id = 9) const bool shaded = false;
 
-// Zero also if one of the values is not finite, and if the difference or its reciprocal is no normal float:
-// devices divide by such numbers as by zero or infinity.
+// The difference; zero if it counts as rounding, if a value is not finite, or if the difference or its
+// reciprocal is not a normal float: devices divide by such numbers as by zero or infinity.
 float differenceOf(float ahead, float behind) {
   float difference = ahead - behind;
   float least = max(leastGradient * (abs(ahead) + abs(behind)), 1.2e-38);

@@ -31,7 +31,7 @@ Sample sampleOf(vec4 colorAndDepth, float length) {
 layout(constant_id = 7) const bool mayBeInfinite = true;
 layout(constant_id = 8) const bool reachesBeyond = true;
 
-// No branches from here on, so that several fetches are under way at a time: mix selects.
+// The code from here on selects with mix and has no branches, so that several fetches overlap.
 
 bool isFinite(float value) { return !mayBeInfinite || abs(value) <= 3.0e38; }
 

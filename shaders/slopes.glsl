@@ -1,4 +1,4 @@
-// How the faces of supersegments lean. Twin of vdi/reference/Slopes.cpp; its header states the rules.
+// The slopes of supersegments' faces. Twin of vdi/reference/Slopes.cpp; its header states the rules.
 //
 // Needs: shared/render.h, optical.glsl, box_faces.glsl; push.
 

@@ -1,4 +1,4 @@
-// Stores reduced pre-segments as supersegments, one invocation a list, because a supersegment's rounding
+// Stores reduced pre-segments as supersegments, one invocation per list, because a supersegment's rounding
 // error is carried to the next one.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -13,7 +13,7 @@ layout(push_constant, scalar) uniform Push { ReduceConstants push; };
 // Compositing: lists without pre-segments are in ReduceConstants::fitting.
 layout(constant_id = 3) const bool mayFit = false;
 
-// Depths that two ranks rounded to codes may overlap.
+// Moves depths behind those before: depths that two ranks rounded to codes may overlap.
 uvec2 behindReach(uvec2 code) {
   uvec2 depths = depthCodes(code);
   uint front = min(max(depths.x, storeReach), uint(maxDepthCode) - 1u);

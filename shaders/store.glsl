@@ -1,5 +1,5 @@
 // Supersegments in memory: 24 bytes of floats, or 8 of codes. Storing codes is the twin of
-// vdi/reference/Compaction.h, loading them of `expanded` in vdi/core/Supersegment.cpp.
+// vdi/reference/Compaction.h; loading them is the twin of `expanded` in vdi/core/Supersegment.cpp.
 #ifndef VDI_STORE_GLSL
 #define VDI_STORE_GLSL
 #include "shared/lists.h"
@@ -108,8 +108,8 @@ void storeSegment(SegmentArray segments, uint slot, OpticalSegment segment, Stor
 }
 
 // The latest codes of a list that are not in memory yet. Four that fill a sector of a cache line are written
-// together: neighbouring invocations write to different lines, and a GPU takes as long for 8 bytes of one as
-// for 32 (on an H200, storing takes 0.55 of the time).
+// together: neighbouring invocations write to different lines, and a GPU takes as long for 8 bytes of a line
+// as for 32 (on an H200, storing takes 0.55 of the time).
 uvec2 waiting[3];
 
 // Stores the i-th of `count` codes at place `at`.

@@ -1,6 +1,6 @@
 // Traverses a ray from column to column of V_O's picture. Reconstruction::Smooth and Sheared blend the two
-// lists of each that are beside the ray; Reconstruction::Constant uses the one or two that the ray crosses.
-// Twin of traverseSmoothly and traverseLists in vdi/reference/Render.cpp.
+// lists of each column that are beside the ray; Reconstruction::Constant uses the one or two that the ray
+// crosses. Twin of traverseSmoothly and traverseLists in vdi/reference/Render.cpp.
 //
 // Needs: masks.glsl, tile_mask.glsl, line.glsl, intersect.glsl; params, smoothReconstruction, lanesPerRay,
 // rayLane, accumulate.
@@ -17,7 +17,7 @@ float shareOfNext(float beyond) {
   return clamp((beyond - onCentre) / (1.0 - 2.0 * onCentre), 0.0, 1.0);
 }
 
-// Adds what each of a ray's two invocations has seen, already weighted.
+// Adds up the weighted intersections of a ray's two invocations.
 Intersection ofBoth(Intersection own) {
   return Intersection(own.light + subgroupShuffleXor(own.light, 1u),
                       min(own.entered, subgroupShuffleXor(own.entered, 1u)));
@@ -74,7 +74,7 @@ Column columnAt(PictureLine line, int column, vec2 edges, vec2 fractions) {
     here.rows = clamp(int(below) + ivec2(0, 1), ivec2(0), maxRow);
   } else {
     here.rows = clamp(ivec2(floor(line.row + here.edges * line.rows)), ivec2(0), maxRow);
-    // A diagonal through corners may touch a third list: too little to intersect.
+    // A diagonal through corners may touch a third list, but too little to intersect it.
     here.rows.x = clamp(here.rows.x, here.rows.y - 1, here.rows.y + 1);
     here.share = here.rows.x == here.rows.y ? 0.0 : 0.5;
   }
@@ -83,8 +83,8 @@ Column columnAt(PictureLine line, int column, vec2 edges, vec2 fractions) {
   return here;
 }
 
-// Columns read at a time, which takes about as long as reading one. Half a tile, because each of a ray's two
-// invocations takes a part of the tile.
+// Number of columns to read at a time, which takes about as long as reading one: half a tile, because each of
+// a ray's two invocations takes a part of the tile.
 const int columnsAtOnce = 4;
 // Bits in the result of listsToIntersect: a column's first and second list.
 const uint firstListBit = 1u;
@@ -110,7 +110,8 @@ uint listsToIntersect(PictureLine line, int tile) {
       uint64_t secondMask = params.heads.at[here.lists.y].mask;
       vec2 bins = vec2(at(line.bins, fraction), at(line.bins, nextFraction));
       // Products, because && would branch: all masks are requested before the first one is awaited. If the
-      // picture ends within a tile, rounding may let a line that leaves it reach a column outside it.
+      // picture ends within a tile, rounding may let a line that leaves the picture reach a column outside
+      // it.
       uint passes = uint(nextEdge != edge) * uint(column <= maximum);
       uint meetsFirst = passes * uint(here.share < 1.0) * uint(mayMeet(firstMask, bins));
       uint meetsSecond = passes * uint(here.share > 0.0) * uint(mayMeet(secondMask, bins));
@@ -178,7 +179,7 @@ Intersection intersectColumn(PictureLine line, int column, float shortening, uin
   return own;
 }
 
-// Tile by tile: first finds all lists to intersect, then intersects them, so that neighbouring rays do the
+// Goes tile by tile: finds all lists to intersect, then intersects them, so that neighbouring rays do the
 // same at the same time.
 void traverse(PictureLine line) {
   bool up = line.direction > 0.0;

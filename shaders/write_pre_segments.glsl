@@ -13,22 +13,22 @@ struct OpenPreSegment {
   bool open;            // otherwise the next visible interval begins another one, if there is room
   bool startsRun;
   vec4 first;           // appearance of its first interval
-  float deviation;      // of its intervals from that
+  float deviation;      // sum over its intervals
   vec2 span;            // front, back
   float before;         // transmittance in front of it
-  float transmittance;  // of it
+  float transmittance;  // of its own material
   vec4 light;           // premultiplied colour, optical depth
 };
 
 struct PreSegmentWriter {
-  PreSegmentArray preSegments;  // the list's
-  uint slots;                   // for all of them
-  uint room;                    // for those that do not begin a run, if there are several ranks
+  PreSegmentArray preSegments;  // of the list
+  uint slots;                   // room for all pre-segments
+  uint room;                    // room for those that begin no run, if there are several ranks
   uint supersegments;           // most that merging may leave, unless the list has more runs
   float initialTolerance;
   float tolerance;
   uint begun;
-  uint runs;  // those that begin a run; counted if there are several ranks
+  uint runs;  // number of those that begin a run; counted if there are several ranks
   bool cut;   // whether the next one begins a run
   OpenPreSegment last;
 };
@@ -129,8 +129,8 @@ void addVisible(inout PreSegmentWriter writer, Interval interval, bool deviates,
   absorb(writer.last, interval);
 }
 
-// Requests to write the list again with room for its runs. It has more of them than the counted
-// lists around it.
+// Requests that the list be written again with room for its runs, of which it has more than the
+// counted lists around it.
 void askForRoom(PreSegmentWriter writer, ListProgress progress, uint list) {
   atomicAdd(params.status.at[statusWrongLists], 1u);
 #ifdef SEVERAL_RANKS

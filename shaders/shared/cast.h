@@ -48,7 +48,7 @@ struct CastParams {
   VDI_ADDRESS(SegmentArray) segments;        // compact; bisection
   VDI_ADDRESS(PreSegmentArray) preSegments;  // compact; merging
   VDI_ADDRESS(UintArray) written;            // [h][w]: pre-segments
-  VDI_ADDRESS(UintArray) left;               // [h][w]: the number of them to keep
+  VDI_ADDRESS(UintArray) left;               // [h][w]: the number of pre-segments to keep
   VDI_ADDRESS(Vec4Array) colors;             // [h][w], premultiplied
   VDI_ADDRESS(FloatArray) depths;            // [h][w]
   VDI_ADDRESS(UintPairArray) extremes;       // [h][w]: instead of colors and depths (blending.glsl)

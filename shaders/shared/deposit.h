@@ -7,7 +7,7 @@ VDI_SHARED_BEGIN
 
 VDI_CONST uint depositGroup = 64;
 
-// How a particle spreads (vdi/core/Particles.h).
+// Kernels by which a particle spreads (vdi/core/Particles.h).
 VDI_CONST uint depositModeCloud = 0;   // cloud in cell; the shares add up to 1
 VDI_CONST uint depositModeKernel = 1;  // cubic spline; the device divides the shares by their sum
 VDI_CONST uint depositModeShares = 2;  // cubic spline; `weight` has been divided by the sum of shares

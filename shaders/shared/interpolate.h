@@ -9,7 +9,7 @@ VDI_CONST uint interpolateGroup = 64;
 
 // A band of lists; every stride-th list of every stride-th row is counted.
 struct InterpolateConstants {
-  // [countedRows][countedWidth]: the finest with few enough pre-segments
+  // [countedRows][countedWidth]: the finest tolerance with few enough pre-segments
   VDI_ADDRESS(FloatArray) countedTolerances;
   // [countedRows][countedWidth]: number of pre-segments at that tolerance
   VDI_ADDRESS(UintArray) countedPreSegments;

@@ -12,8 +12,8 @@ VDI_CONST uint countedLevelWords = 3;
 VDI_CONST uint countedTolerance = 1;  // position of the finest tolerance's count
 VDI_CONST uint countedRuns = 9;
 
-// Words that report lists whose written count differs from the stored one: how many there are, and with
-// several ranks the most runs in any of them.
+// Words that report lists whose written count differs from the stored one: their number and, with several
+// ranks, the most runs in any of them.
 VDI_CONST uint statusWrongLists = 0;
 VDI_CONST uint statusMostRuns = 1;
 VDI_CONST uint statusWords = 2;
@@ -34,8 +34,8 @@ struct StoredPreSegment {
   vec2 span;     // front, back
   float before;  // transmittance in front of it
   float unused;
-  // Premultiplied colour and optical depth of all of it; the latter is negative if it must not merge with the
-  // one before
+  // Premultiplied colour and optical depth of the whole pre-segment. The optical depth is negative if the
+  // pre-segment must not merge with the one before.
   vec4 light;
 };
 

@@ -9,11 +9,11 @@ VDI_CONST uint quotaGroup = 64;
 
 struct QuotaConstants {
   VDI_ADDRESS(UintArray) own;          // [rows][width][countedLevelWords]: this rank's counts
-  // [rows][width][countedLevelWords]: byte by byte the sum of all ranks', at most 255
+  // [rows][width][countedLevelWords]: the sum of all ranks' counts, byte by byte, at most 255
   VDI_ADDRESS(UintArray) sum;
-  // [rows][width]: the finest with few enough pre-segments in all; 0: an empty list
+  // [rows][width]: the finest tolerance with few enough pre-segments in all; 0: an empty list
   VDI_ADDRESS(FloatArray) tolerances;
-  VDI_ADDRESS(UintArray) preSegments;  // [rows][width]: this rank's at that tolerance
+  VDI_ADDRESS(UintArray) preSegments;  // [rows][width]: this rank's number at that tolerance
   VDI_ADDRESS(UintArray) quotas;       // [rows][width]: as in InterpolateConstants
   // [rows]: sum of the supersegments that all ranks together will have in a row
   VDI_ADDRESS(UintArray) weights;

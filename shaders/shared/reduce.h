@@ -14,7 +14,7 @@ struct ReduceConstants {
   VDI_ADDRESS(PreSegmentArray) preSegments;
   VDI_ADDRESS(UintArray) preSegmentOffsets;  // [lists + 1]
   VDI_ADDRESS(UintArray) written;            // [lists]: pre-segments
-  VDI_ADDRESS(UintArray) left;               // [lists]: the number of them to keep
+  VDI_ADDRESS(UintArray) left;               // [lists]: the number of pre-segments to keep
   VDI_ADDRESS(UintArray) offsets;            // [lists + 1], exclusive prefix sum of left
   VDI_ADDRESS(UintArray) longLists;          // [lists]: lists that subgroups reduce, in any order
   VDI_ADDRESS(UintArray) longListCount;      // [1]: their number

@@ -16,23 +16,23 @@ VDI_CONST uint renderKinds = 24;         // classes of tiles, by their amount of
 VDI_CONST uint renderOrderSquares = 0;
 VDI_CONST uint renderOrderColumns = 1;
 VDI_CONST uint renderOrderRows = 2;
-// Form of the picture's colours: premultiplied floats; premultiplied bytes; straight bytes. Four a pixel.
+// Form of the picture's colours: premultiplied floats; premultiplied bytes; straight bytes. Four per pixel.
 VDI_CONST uint renderPictureFloats = 0;
 VDI_CONST uint renderPictureBytes = 1;
 VDI_CONST uint renderPictureStraightBytes = 2;
 VDI_CONST uint expandGroup = 64;
-VDI_CONST uint expandModeSegments = 0;    // one invocation a supersegment
-VDI_CONST uint expandModeDepths = 1;      // one a list
+VDI_CONST uint expandModeSegments = 0;    // one invocation per supersegment
+VDI_CONST uint expandModeDepths = 1;      // one per list
 VDI_CONST uint expandModeBins = 2;        // one invocation
-VDI_CONST uint expandModeMasks = 3;       // one a list
-VDI_CONST uint expandModeTiles = 4;       // one a tile
-VDI_CONST uint expandModeLargeTiles = 5;  // one a large tile
-VDI_CONST uint expandModeSlopes = 6;        // one a list, after the others
-VDI_CONST uint expandModeLeaningMasks = 7;  // one a list; then the tiles again
+VDI_CONST uint expandModeMasks = 3;       // one per list
+VDI_CONST uint expandModeTiles = 4;       // one per tile
+VDI_CONST uint expandModeLargeTiles = 5;  // one per large tile
+VDI_CONST uint expandModeSlopes = 6;        // one per list, after the others
+VDI_CONST uint expandModeLeaningMasks = 7;  // one per list; then the tiles again
 // Reconstruction::Sheared (vdi/reference/Slopes.h).
 VDI_CONST float renderMaxSlope = 8.0F;  // depth per list, in footprints: 83 degrees
 VDI_CONST float renderSlopes = 127.0F;  // steps from 0 to renderMaxSlope
-VDI_CONST int renderNoSlope = -128;     // while slopes are looked for
+VDI_CONST int renderNoSlope = -128;     // during the search for slopes
 VDI_CONST int renderOnFace = -128;      // in both slopes of a front or a back: it lies on a face of the box
 VDI_CONST uint renderFaces = 6;         // number of a box's faces
 VDI_CONST float renderMostDepth = 6.0F;      // optical depth of a supersegment, behind which hardly anything shows
@@ -61,8 +61,9 @@ struct DepthRange {
 };
 
 // The data of a list that a ray reads first: the position of its supersegments in the compact array, and its
-// mask. `countAndReach` has the number of supersegments in its low listCountBits bits, and above them how far
-// leaning faces reach beyond their depths in the list's middle, in units of listReachUnit slopes.
+// mask. `countAndReach` has the number of supersegments in its low listCountBits bits, and above them the
+// distance by which leaning faces reach beyond their depths in the list's middle, in units of listReachUnit
+// slopes.
 VDI_CONST uint listCountBits = 24;
 VDI_CONST float listReachUnit = 2.0F;
 struct ListHead {
@@ -72,7 +73,7 @@ struct ListHead {
 };
 
 // Numbers of tiles of the new picture to render, and the workgroups for them, which an indirect dispatch
-// reads. Empty between views: the last workgroup empties it.
+// reads. The last workgroup empties the queue, so it is empty between views.
 struct TileQueue {
   uvec3 groups;
   uint count;
@@ -144,7 +145,7 @@ VDI_CONST uint renderMaxClipPlanes = 6;
 struct RenderParams {
   VDI_ADDRESS(ListHeads) heads;
   VDI_ADDRESS(RenderSegmentWords) segments;  // compact array
-  VDI_ADDRESS(UintArray) slopes;             // beside it
+  VDI_ADDRESS(UintArray) slopes;             // in the order of segments
   VDI_ADDRESS(MaskArray) tileDepthMasks;
   VDI_ADDRESS(Vec4Array) colors;   // [height][width]; for bytes, a word each
   VDI_ADDRESS(FloatArray) depths;  // [height][width]
@@ -155,7 +156,7 @@ struct RenderParams {
   VDI_ADDRESS(UintArray) waiting;
   float nearest;  // depth range of the VDI, nearest > 0 in perspective
   float farthest;
-  float pixelSize;  // view-space size of V_O's pixels, at depth 1 (perspective) or anywhere (parallel)
+  float pixelSize;  // view-space size of V_O's pixels, at depth 1 (perspective) or any depth (parallel)
   uint parallel;    // projection of V_O
   float slopeUnit;  // depth per list at a slope of 1
   uint width;       // of the picture, in pixels
@@ -169,7 +170,7 @@ struct RenderParams {
 };
 
 // Ray of the new view's pixel in V_O's view space, as in CastParams: base + u * right + v * up, where t is
-// depth in the new view. Only this changes while a user orbits.
+// depth in the new view. Only these change while a user orbits.
 struct RenderRays {
   vec3 originBase;
   vec3 originRight;

@@ -17,7 +17,7 @@ struct ScanConstants {
   VDI_ADDRESS(UintArray) sums;
   VDI_ADDRESS(UintArray) overflow;  // [1], set to 1 if a total does not fit 32 bits
   // Set to 1 if the total is at most `room` and the word at `guardBefore` is 1, else to 0. An address of 0
-  // disables it.
+  // disables its part of this rule.
   VDI_ADDRESS(UintArray) guard;
   VDI_ADDRESS(UintArray) guardBefore;
   uint count;

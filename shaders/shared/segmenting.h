@@ -21,7 +21,7 @@ VDI_CONST int toleranceLevels = 8;
 VDI_CONST float finestTolerance = 0.002F;
 VDI_CONST float toleranceRatio = 4.0F;
 VDI_CONST float hiddenWeight = 0.15F;
-// Room for pre-segments, in multiples of a list's budget, and what is added to it.
+// Room for pre-segments, in multiples of a list's budget, and the spare room that is added.
 VDI_CONST uint preSegmentsPerBudget = 2;
 VDI_CONST uint sparePreSegments = 4;
 VDI_CONST uint uncountedSparePreSegments = 8;  // plus a quarter of the pre-segments
@@ -33,7 +33,7 @@ VDI_CONST uint histogramLevels = 10;
 // Codes.
 VDI_CONST float maxDepthCode = 16383.0F;
 VDI_CONST float maxCarriedDepth = 1.0F / 16.0F;
-VDI_CONST float maxDepthChange = 0.25F;  // share of the supersegment's own
+VDI_CONST float maxDepthChange = 0.25F;  // share of the supersegment's own optical depth
 VDI_CONST float thinnestStep = 0.0002F;  // least step of opticalDepthOfCode
 VDI_CONST float maxColorChange = 3.0F / 255.0F;
 VDI_CONST float unseen = 1e-6F;
@@ -44,8 +44,8 @@ constexpr uint64_t maxPreSegments(uint64_t maximum) {
   const uint64_t preSegments = preSegmentsPerBudget * maximum;
   return preSegments + preSegments / 4 + uncountedSparePreSegments;
 }
-// Number of samples for which a counted ray takes one. It grows with the rays' length relative to their
-// lists' budget, because a device waits for the longest ray.
+// Number of samples that each sample of a counted ray represents. It grows with the rays' length relative to
+// their lists' budget, because a device waits for the longest ray.
 constexpr uint countedSamplesFor(uint lattice, uint budget) {
   const uint share = lattice / (16 * budget);
   return share < 1 ? 1 : share > 2 ? 2 : share;

@@ -116,7 +116,7 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
   const std::uint32_t lanes = stride > 1 ? lanesPerRay_ : 1;
   const std::uint32_t width = (band.width + stride - 1) / stride * lanes;
   pipelines_.update(commands, params);
-  // Counted samples need not be adjacent.
+  // Counted samples may not be adjacent, so none are requested ahead.
   const std::uint32_t ahead = stride > 1 ? 1 : samplesAhead_;
   commands.dispatch(pipelineFor({program, encoding, lanes, ahead, band.cutAtGaps, params.level >= 0.0F,
                                  params.shaded != 0, params.blendMode}),
