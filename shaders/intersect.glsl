@@ -115,7 +115,7 @@ void meet(inout Seen seen, Leaning of, Part part) {
 Intersection intersectionOf(Seen seen)
     { return Intersection(vec4(seen.light * segmentColorUnit, 1.0 - seen.transmittance), seen.entered); }
 
-RenderSegmentWords listSegments;  // of the current list
+RenderSegmentWords listSegments;  // supersegments of the current list
 UintArray listSlopes;
 
 // The i-th of several supersegments from a slot on, of which `more` follow in the list; beyond these, the

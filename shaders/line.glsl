@@ -13,7 +13,7 @@ struct PictureLine {
   float start;      // column where it starts
   float columns;    // number of columns to its end, > 0
   float direction;  // 1 or -1, from column to column
-  float row;        // at the start
+  float row;        // row where it starts
   float rows;       // per column
   // Perspective: the number of columns is not proportional to the fraction, which is linear in t and in
   // depth.

@@ -9,7 +9,7 @@
 vec3 rayStart;
 vec3 rayDirection;
 float rayLengthOfDepth;  // world length of a unit of depth
-float rayOpticalDepth;   // so far
+float rayOpticalDepth;   // optical depth so far
 uvec2 rayScene;          // samples [x, y) lie in the visible part: the scene's bounds, or a region of it
 float rayEnter;          // depth where the ray enters the visible part, and where it leaves it
 float rayLeave;

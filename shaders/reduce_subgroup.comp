@@ -19,7 +19,7 @@ shared vec4 lights[capacity];
 shared vec4 appearances[capacity];
 shared vec2 spans[capacity];
 shared float befores[capacity];
-shared float costs[capacity];  // of merging each with the next one; unlimited for the last
+shared float costs[capacity];  // cost of merging each with the next one; unlimited for the last
 
 const uint subgroupSize = gl_WorkGroupSize.x;
 uint own;  // index of the invocation in the subgroup
@@ -135,7 +135,7 @@ void mergeCheapest(uint count, uint maxCount, uint cuts) {
 struct ListOfPreSegments {
   PreSegmentArray preSegments;
   uint count;
-  uint maxCount;  // to be left
+  uint maxCount;  // number to be left
 };
 
 ListOfPreSegments listAt(uint place) {

@@ -16,12 +16,12 @@ struct OpenPreSegment {
   float deviation;      // sum over its intervals
   vec2 span;            // front, back
   float before;         // transmittance in front of it
-  float transmittance;  // of its own material
+  float transmittance;  // transmittance of its material
   vec4 light;           // premultiplied colour, optical depth
 };
 
 struct PreSegmentWriter {
-  PreSegmentArray preSegments;  // of the list
+  PreSegmentArray preSegments;  // pre-segments of the list
   uint slots;                   // room for all pre-segments
   uint room;                    // room for those that begin no run, if there are several ranks
   uint supersegments;           // most that merging may leave, unless the list has more runs

@@ -98,8 +98,8 @@ struct CastParams {
   uint countedWidth;
   uint countedSamples;  // one sample, at a multiple of this number, counts for that many
   uint maxPerList;
-  float level;      // in the histogram; negative: equal budgets
-  uint levelShift;  // for levels
+  float level;      // level of the histogram; negative: equal budgets
+  uint levelShift;  // shift of the counts in levels
   // For shading (core/Shading.h): the direction towards each light in world space, zero for one at the eye;
   // its colour, times diffuse.
   vec3 lightDirections[castMaxLights];

@@ -30,7 +30,7 @@ constexpr int deciding = 3;
 /// Patches with the values around them that determine their open places.
 struct Window {
   IndexBox box;
-  std::array<std::ptrdiff_t, 3> strides{};  // of neighbours along each axis
+  std::array<std::ptrdiff_t, 3> strides{};  // distances between neighbours along each axis
   LocalValues values;
   std::vector<std::uint8_t> known;  // 0: still open, or masked
 };
@@ -166,7 +166,7 @@ class Continuation {
   std::span<const OpenPatch> patches_;
   std::vector<Window> windows_;  // one for all patches, or one for each
   std::vector<Place> open_;
-  std::vector<std::pair<Place, double>> filled_;  // by the current step
+  std::vector<std::pair<Place, double>> filled_;  // places that the current step has filled
 };
 
 }  // namespace

@@ -11,7 +11,7 @@ namespace vdi::comm {
 
 /// A patch of a block, and the places in it for which no block has a value.
 struct OpenPatch {
-  IndexBox box;                // of the patch
+  IndexBox box;                // the patch's box
   std::byte* values;           // [size.z][size.y][size.x], of the block's type; the patch's own memory
   std::vector<IndexBox> open;  // parts of `box`, disjoint
 };

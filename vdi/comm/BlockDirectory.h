@@ -19,11 +19,11 @@ inline constexpr double latticeTolerance = 1e-3;
 
 /// A block as other ranks need to know it.
 struct BlockEntry {
-  glm::dvec3 origin;   // of the first stored value
+  glm::dvec3 origin;   // position of the first stored value
   glm::dvec3 spacing;  // world
-  glm::dvec3 offset;   // of the values from points or the middles of cells, in spacings
+  glm::dvec3 offset;   // offset of the values from points or the middles of cells, in spacings
   Box asked;           // the owned box that the caller set
-  Box owned;           // with gaps closed and close faces made equal
+  Box owned;           // the owned box with gaps closed and close faces made equal
   glm::ivec3 dims;     // stored values
   std::int32_t rank;
   std::int32_t block;  // index on its rank
@@ -42,8 +42,8 @@ struct BlockEntry {
   }
 };
 
-/// How the level of a block compares with that of another one: by the volumes that one value of each
-/// represents. Volumes that differ by at most 1 % are of the same level.
+/// The level of a block compared with that of another one, by the volumes that one value of each represents.
+/// Volumes that differ by at most 1 % are of the same level.
 enum class LevelOrder { Finer, Same, Coarser };
 LevelOrder levelOrderOf(const BlockEntry& block, const BlockEntry& comparedWith);
 
@@ -59,7 +59,7 @@ class BoxTree {
  private:
   struct Node {
     Box bounds;
-    std::size_t first = 0;  // in order_
+    std::size_t first = 0;  // first index in order_
     std::size_t last = 0;
     std::size_t lower = 0;  // child nodes; 0: a leaf
     std::size_t upper = 0;

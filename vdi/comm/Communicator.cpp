@@ -223,8 +223,8 @@ Communicator Communicator::fromMpi(int fortranHandle) {
   check(MPI_Comm_rank(node.handle(), &state->localRank), "MPI_Comm_rank");
   OwnedComm part;
   int host = 0;
-  std::exception_ptr
-      bad;  // reported later, by all ranks: a rank that left here would leave the others waiting
+  // All ranks report this later: a rank that left here would leave the others waiting.
+  std::exception_ptr bad;
   try {
     host = hostOf(state->localRank);
   } catch (const Error&) {

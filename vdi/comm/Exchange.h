@@ -64,16 +64,15 @@ class Exchange {
   const Communicator& comm_;
   Transport transport_;
   Place outbox_;
-  std::shared_ptr<HostMemory>
-      window_;  // of this host's ranks: their outboxes side by side; all have it, or none
-  std::vector<std::uint64_t>
-      parts_;                     // sizes of all ranks' outboxes in such windows; empty: there are none yet
-  bool everyHostShares_ = false;  // each host's ranks have a window
-  bool messages_ = true;          // some pair of ranks has no window in common
-  std::shared_ptr<HostMemory> inbox_;  // for messages
+  /// The outboxes of this host's ranks, side by side. Either all of these ranks have it, or none.
+  std::shared_ptr<HostMemory> window_;
+  std::vector<std::uint64_t> parts_;   // sizes of all ranks' outboxes in windows; empty: no window yet
+  bool everyHostShares_ = false;       // each host's ranks have a window
+  bool messages_ = true;               // some pair of ranks has no window in common
+  std::shared_ptr<HostMemory> inbox_;  // memory for received messages
   std::vector<std::uint64_t> sent_;    // headers: [size][headerWords]
   std::vector<std::uint64_t> received_;
-  std::vector<Incoming> incoming_;  // with memory for one of each rank
+  std::vector<Incoming> incoming_;  // has memory for one piece of each rank
 };
 
 }  // namespace vdi::comm

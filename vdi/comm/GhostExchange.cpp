@@ -134,7 +134,7 @@ struct Wanted {
   bool keep = false;                    // the caller's ghost values, which stay if no block has better ones
   std::vector<IndexBox> asked;          // parts that other blocks have; they may overlap
   std::size_t copies = 0;               // number of values to copy
-  std::shared_ptr<std::byte[]> values;  // of the block's type
+  std::shared_ptr<std::byte[]> values;  // values of the block's type
   std::vector<double> sums;             // empty unless some values are means or interpolated
   std::vector<double> weights;
 };
@@ -143,7 +143,7 @@ struct Wanted {
 struct Grid {
   Block block;
   bool cells = false;
-  double volume = 0.0;  // of a single value
+  double volume = 0.0;  // volume that a single value represents
   std::vector<Box> owned;
   std::vector<Box> finer;       // parts that finer blocks took over
   std::vector<IndexBox> given;  // its own values
@@ -508,7 +508,7 @@ class LayerExchange {
     });
   }
 
-  /// The first of those boxes that are nearest in steps along the axes.
+  /// The nearest box in steps along the axes; the first one in a tie.
   static const IndexBox& nearestOf(std::span<const IndexBox> boxes, const glm::ivec3& at) {
     if (boxes.size() == 1) return boxes.front();
     const auto stepsTo = [&at](const IndexBox& box) {
@@ -658,9 +658,9 @@ class LayerExchange {
   const BlockDirectory& directory_;
   std::vector<Block>& blocks_;
   std::vector<double> levels_;              // volumes of a value, descending
-  std::vector<std::int32_t> levelNumbers_;  // of the directory's entries: indices of levels_
+  std::vector<std::int32_t> levelNumbers_;  // index in levels_ of each of the directory's entries
   std::vector<Grid> grids_;
-  std::vector<std::vector<Asked>> outgoing_;   // by the rank that answers
+  std::vector<std::vector<Asked>> outgoing_;   // requests, by the rank that answers
   std::vector<std::uint64_t> rounds_;          // 1 for each round in which a rank wants values
   Gathered incoming_;                          // requests of other ranks
   std::array<SamplePlaces, 3> places_;         // memory for one answer at a time

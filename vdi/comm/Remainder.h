@@ -39,9 +39,9 @@ class Remainder {
 
  private:
   struct Node {
-    Box bounds;  // of the parts that are left
+    Box bounds;  // bounds of the parts that are left
     std::uint32_t parent;
-    std::uint32_t first;  // of its parts, which follow each other
+    std::uint32_t first;  // first of its parts, which are adjacent
     std::uint32_t parts;  // 0: not cut yet, or nothing was left
   };
 

@@ -14,7 +14,7 @@ namespace vdi::comm {
 /// The ascending places, along an axis, of the samples that make up each of several values.
 struct SamplePlaces {
   std::vector<double> places;          // world
-  std::vector<std::size_t> starts{0};  // in `places`: those of each value, and the end
+  std::vector<std::size_t> starts{0};  // index in `places` of each value's first place, and the end
 
   /// Ends a value: later places belong to the next one.
   void endValue() { starts.push_back(places.size()); }
@@ -41,7 +41,7 @@ class Sampler {
   /// A place along an axis, to which up to two values contribute.
   struct Sample {
     int count = 0;
-    std::array<std::size_t, 2> offsets{};  // in the gathered values
+    std::array<std::size_t, 2> offsets{};  // positions among the gathered values
     std::array<double, 2> weights{};
   };
   Sample sampleAt(std::size_t axis, double place);
@@ -50,7 +50,7 @@ class Sampler {
 
   const Block* block_ = nullptr;
   std::array<std::vector<Sample>, 3> samples_;
-  std::array<std::vector<std::size_t>, 3> starts_;  // in samples_: those of each value, and the end
+  std::array<std::vector<std::size_t>, 3> starts_;  // first index in samples_ of each value, and the end
   LocalValues::Indices indices_;
   LocalValues values_;
 };

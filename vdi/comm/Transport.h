@@ -1,4 +1,4 @@
-// How ranks of one host exchange bytes.
+// The ways in which ranks of one host exchange bytes.
 #pragma once
 
 #include <string_view>

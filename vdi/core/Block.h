@@ -128,7 +128,7 @@ double loadValue(ScalarType type, const void* data, std::size_t index);
 /// Stores the nearest value that the type can represent; integers take 0 for NaN.
 void storeValue(ScalarType type, void* data, std::size_t index, double value);
 
-ScalarRange finiteRange(const Block& block);  // of stored values and patches; uses several threads
+ScalarRange finiteRange(const Block& block);  // range of stored values and patches; uses several threads
 
 /// Range of magnitudes that the device can represent. If all values are smaller than `minimum`, they are
 /// lost; values larger than `maximum` overflow. Applies to f32 and f64; the other types have no such values.

@@ -18,7 +18,7 @@ BoxFaces facesOf(const Box& box, const View& view) {
 }
 
 FaceTolerance faceToleranceOf(double depthStep, double farthest) {
-  constexpr double rounding = 4e-6;  // of floats along a ray
+  constexpr double rounding = 4e-6;  // relative error of floats along a ray
   return {depthStep + rounding * farthest, rounding * farthest};
 }
 

@@ -20,7 +20,7 @@ const char* toString(Budget budget);  // "list", "total"
 /// Throws Error{InvalidArgument} that lists the valid names.
 Budget budgetFromString(const std::string& name);
 
-constexpr std::uint32_t maxSupersegments = 1024;  // in one list
+constexpr std::uint32_t maxSupersegments = 1024;  // limit for one list
 
 /// The most that a list may hold. Twice N_S is enough: four times gave no better pictures.
 constexpr std::uint32_t maxPerList(std::uint32_t supersegments, Budget budget) {
@@ -34,7 +34,7 @@ constexpr std::uint32_t maxPerList(std::uint32_t supersegments, Budget budget) {
 struct SupersegmentHistogram {
   static constexpr std::size_t levels = 10;
   std::array<std::uint64_t, levels> supersegments{};  // each list limited to maxPerList
-  std::uint64_t equally = 0;                          // with at most N_S in each list
+  std::uint64_t equally = 0;                          // number with at most N_S in each list
   bool operator==(const SupersegmentHistogram&) const = default;
   SupersegmentHistogram& operator+=(const SupersegmentHistogram& other) {
     for (std::size_t level = 0; level < levels; ++level) supersegments[level] += other.supersegments[level];

@@ -52,7 +52,7 @@ struct ImagePlane {
 /// pixels and rays.
 class View {
  public:
-  static constexpr int maxSide = 32768;  // of a viewport, in pixels
+  static constexpr int maxSide = 32768;  // largest side of a viewport, in pixels
   /// Square pixels; the vertical extent is the camera's, as in VTK. A view-up parallel to the view direction
   /// is replaced by the axis most orthogonal to it, a view-up of zero by (0, 1, 0). Throws
   /// Error{InvalidArgument} for a viewport outside 1 .. maxSide, a view angle outside (0, 180), a parallel
@@ -97,7 +97,7 @@ class View {
   glm::dvec3 forward_;
   double halfHeight_;
   double halfWidth_;
-  glm::dvec2 middle_{0.0};  // of the image plane, in the units of ImagePlane
+  glm::dvec2 middle_{0.0};  // middle of the image plane, in the units of ImagePlane
   glm::dvec2 pixelSize_;
 };
 

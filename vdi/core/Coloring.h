@@ -13,14 +13,14 @@ namespace vdi {
 struct ScalarArray {
   std::string name;    // UTF-8; empty when unknown
   bool cells = false;  // cell data; else point data
-  int components = 1;  // of the array, >= 1
+  int components = 1;  // number in the array, >= 1
   int component = 0;   // the one shown, < components; or magnitude, or phase (ComponentValues.h)
   bool operator==(const ScalarArray&) const = default;
 };
 
 struct Coloring {
   ScalarArray array;
-  ScalarRange range;          // of the shown values, over all ranks; min > max when there are none
+  ScalarRange range;          // range of the shown values, over all ranks; min > max without values
   TransferFunction function;  // valid as validate(TransferFunction) defines it
   bool operator==(const Coloring&) const = default;
 };

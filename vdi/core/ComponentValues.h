@@ -23,8 +23,8 @@ enum class ComponentType : std::uint32_t {
 };
 
 /// In place of a component's number, as in ScalarArray::component.
-constexpr int magnitude = -1;  // of all components
-constexpr int phase = -2;      // of two, real and imaginary: from -pi to pi, 0 for the number 0
+constexpr int magnitude = -1;  // magnitude of all components
+constexpr int phase = -2;      // phase of two, real and imaginary: from -pi to pi, 0 for the number 0
 
 /// An array of vectors. Component c of value (x, y, z) lies at `first` + x * strides.x + y * strides.y + z *
 /// strides.z + c * componentStride, in bytes.

@@ -22,8 +22,8 @@ struct EncodingOf<Supersegment> {
   /// The encoding's number: in a file's header, and in the shaders' constant `encoding` (store.glsl).
   static constexpr Precision precision = Precision::Full;
   static constexpr bool hasDepthCode = false;
-  static constexpr std::size_t chunkBytes = 24;     // of a supersegment in a file's chunk, before LZ4
-  static constexpr double typicalFileBytes = 14.5;  // of a supersegment in a file, on average
+  static constexpr std::size_t chunkBytes = 24;     // size of a supersegment in a file's chunk, before LZ4
+  static constexpr double typicalFileBytes = 14.5;  // mean size of a supersegment in a file
 };
 
 template <>

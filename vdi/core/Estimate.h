@@ -30,7 +30,7 @@ struct VdiEstimate {
   double bytesInMemory = 0.0;
   double mostBytesInMemory = 0.0;  // if every list is full
   double bytesAsFile = 0.0;
-  std::optional<double> seconds;  // without the upload of values
+  std::optional<double> seconds;  // time without the upload of values
   bool isFromLast = false;
 };
 

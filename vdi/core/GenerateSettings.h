@@ -12,7 +12,7 @@
 
 namespace vdi {
 
-/// How samples become supersegments.
+/// The algorithm that makes supersegments of samples.
 enum class Algorithm : std::uint32_t {
   Bisection = 0,  // the paper's: searches each list's sensitivity (section 2.4)
   Merge = 1,      // no search: starts with fine pieces, then merges the cheapest neighbours until they fit

@@ -61,8 +61,8 @@ void removeNamesOfTheDead() {
 std::string newName() {
   static std::atomic<std::uint32_t> made{0};
   static const std::uint64_t process = (std::uint64_t{std::random_device()()} << 32) | std::random_device()();
-  return fmt::format("{}{:x}-{}-{}", prefix, process, getpid(),
-                     made++);  // a forked process inherits all of these but getpid()
+  // A forked process inherits all of these except getpid().
+  return fmt::format("{}{:x}-{}-{}", prefix, process, getpid(), made++);
 }
 
 }  // namespace

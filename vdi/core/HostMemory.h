@@ -45,7 +45,7 @@ class HostMemory {
   HostMemory() = default;
   std::span<std::byte> bytes_;
   std::string name_;
-  int descriptor_ = -1;  // of shareable memory, until unlink; its lock shows that this process lives
+  int descriptor_ = -1;  // exists for shareable memory, until unlink; its lock shows that this process lives
   bool linked_ = false;  // the name exists, and this object has to unlink it
 };
 

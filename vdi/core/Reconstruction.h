@@ -1,4 +1,4 @@
-// How rendering fills the space between a VDI's lists.
+// The ways in which rendering fills the space between a VDI's lists.
 #pragma once
 
 #include <cstdint>

@@ -13,7 +13,7 @@ namespace vdi {
 /// A plane that shows the side to which its normal points, as vtkPlane does for a mapper.
 struct ClipPlane {
   glm::dvec3 origin{0.0};            // any point of the plane, world
-  glm::dvec3 normal{0.0, 0.0, 1.0};  // of any length but 0
+  glm::dvec3 normal{0.0, 0.0, 1.0};  // any length but 0
   bool operator==(const ClipPlane&) const = default;
 };
 

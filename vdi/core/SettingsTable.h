@@ -19,10 +19,10 @@ struct Setting {
   enum class Kind { Number, Count, Name, Flag };
 
   Kind kind = Kind::Number;
-  const char* name = "";      // in messages: "termination opacity"
-  const char* property = "";  // of ParaView's filter: "TerminationOpacity"
-  const char* key = "";       // of JSON runs: "termination_opacity"
-  const char* help = "";      // of the tool's option, whose name is optionOf(*this)
+  const char* name = "";      // name in messages: "termination opacity"
+  const char* property = "";  // property of ParaView's filter: "TerminationOpacity"
+  const char* key = "";       // key of JSON runs: "termination_opacity"
+  const char* help = "";      // help on the tool's option, whose name is optionOf(*this)
   double low = 0.0;           // the range, [low, high]
   double high = 1.0;
   bool excludesLow = false;                                     // (low, high]

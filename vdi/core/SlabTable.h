@@ -50,8 +50,8 @@ class SlabIntegral {
 /// A strip is cut into rows, of which neighbours share a texel: entry e is in row e / slabStripStep, column e
 /// % slabStripStep, and again at the end of the row before.
 struct SlabTable {
-  float length = 1.0F;               // of its slabs, in unit distances
-  std::size_t positions = 0;         // of the transfer table: TransferTable::entries.size()
+  float length = 1.0F;               // length of its slabs, in unit distances
+  std::size_t positions = 0;         // size of the transfer table: TransferTable::entries.size()
   std::vector<glm::u16vec4> texels;  // [height()][slabSide]: half floats (core/Half.h)
   glm::vec4 below{0.0F};  // a slab wholly below the transfer table's range: straight colour and optical depth
   glm::vec4 above{0.0F};  // a slab wholly above it

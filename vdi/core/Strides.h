@@ -49,7 +49,7 @@ inline int fastestAxis(const ByteStrides& strides) {
 class Tiling {
  public:
   static constexpr int width = 16;     // along x if another axis is the fastest
-  static constexpr int values = 4096;  // at most, in a tile
+  static constexpr int values = 4096;  // most values in a tile
 
   Tiling(const IndexBox& box, int fastest) : box_(box), tile_(1) {
     const glm::ivec3 size = box.size();

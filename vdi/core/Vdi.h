@@ -19,18 +19,18 @@ namespace vdi {
 /// bottom.
 struct Vdi {
   Camera camera;  // V_O
-  int width = 0;  // of all lists, the margin included
+  int width = 0;  // columns of lists, the margin included
   int height = 0;
   /// Lists beyond the picture that the camera frames, on its left and right (x), below and above it (y). They
   /// have the picture's spacing.
   glm::ivec2 margin{0};
   std::uint32_t budget = 0;  // the most that a list may hold: N_S, or maxPerList
-  Box bounds;                // of the scene, world
+  Box bounds;                // the scene's box, world
   double sampleStep = 0.0;   // depth interval of one sample (DepthLattice::step)
   double time = 0.0;         // simulation time, 0 when unknown
   std::uint64_t timeStep = 0;
   std::optional<Coloring> coloring;  // meaning of the colours, if known
-  DepthCode depthCode;               // of compact lists; all 0 otherwise
+  DepthCode depthCode;               // code of compact lists; all 0 otherwise
   AnyLists lists;                    // width * height lists
 
   /// Size of the requested picture: all lists but the margin's.
@@ -45,7 +45,7 @@ struct Vdi {
   std::size_t supersegmentCount() const {
     return std::visit([](const auto& l) { return l.segments.size(); }, lists);
   }
-  /// A supersegment as floats, whatever the precision; index in [0, supersegmentCount()).
+  /// A supersegment as floats, in any precision; index in [0, supersegmentCount()).
   Supersegment supersegment(std::size_t index) const;
   /// All lists as floats; a copy.
   SupersegmentLists expandedLists() const;

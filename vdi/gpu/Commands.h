@@ -87,7 +87,7 @@ class Commands {
   }
   void dispatchBytes(const ComputePipeline& pipeline, std::span<const std::byte> constants, std::uint32_t x,
                      std::uint32_t y, std::uint32_t z);
-  /// Dispatches as many workgroups as the buffer's first three words say at execution time.
+  /// Dispatches the numbers of workgroups that the buffer's first three words contain at execution time.
   template <typename PushConstants>
   void dispatchIndirect(const ComputePipeline& pipeline, const PushConstants& constants,
                         const Buffer& groups) {

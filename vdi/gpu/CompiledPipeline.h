@@ -23,8 +23,8 @@ std::span<const std::uint32_t> shaderCode(std::string_view name);
 
 struct ComputePipelineInfo {
   std::string_view shader;  // name for shaderCode
-  std::span<const std::uint32_t>
-      code;  // SPIR-V to use instead if it is not empty; needed during construction only
+  /// SPIR-V to use instead if it is not empty; needed during construction only.
+  std::span<const std::uint32_t> code;
   std::uint32_t pushConstantBytes = 0;        // at most 128
   std::uint32_t imageCount = 0;               // size of the sampler3D array at set 0, binding 0
   std::uint32_t uniformBytes = 0;             // size of the uniform block at set 0, binding 1; 0: none

@@ -36,8 +36,8 @@ class DepositPass {
   static constexpr std::uint64_t atOnce = std::uint64_t{1} << 22;  // cells downloaded at a time, 32 MiB
   std::shared_ptr<Device> device_;
   ComputePipeline pipeline_;
-  std::vector<std::uint64_t> cells_;  // of each block
-  std::vector<std::uint64_t> first_;  // of each block, in sums_
+  std::vector<std::uint64_t> cells_;  // number of cells of each block
+  std::vector<std::uint64_t> first_;  // first cell of each block, in sums_
   Buffer sums_;
   Buffer blocks_;
   Buffer particles_;

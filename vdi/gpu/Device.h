@@ -34,7 +34,7 @@ class Device {
 
   const std::string& name() const;  // as the driver reports it
   bool isCpu() const;               // lavapipe, for example
-  /// Whether to choose programs that do more work to wait less; true for GPUs. The results are the same.
+  /// Whether to choose programs that do more work in order to wait less, as GPUs need. Results are the same.
   bool runsGpuPrograms() const;
   const DeviceLimits& limits() const;
   /// Whether the device was lost. It stays lost: create another one.

@@ -18,7 +18,7 @@ struct DeviceSummary {
   std::string name;
   DeviceType type = DeviceType::Other;
   std::string driver;                 // name and version
-  std::uint64_t memoryBytes = 0;      // of the largest device-local heap
+  std::uint64_t memoryBytes = 0;      // size of the largest device-local heap
   std::vector<std::string> refusals;  // all requirements that it doesn't meet; empty: usable
 };
 

@@ -25,8 +25,8 @@ constexpr std::uint64_t maxBytes = 256ULL << 20;
 /// The file's header.
 struct Header {
   std::array<char, 8> what{'v', 'd', 'i', 's', 'h', 'd', 'r', '1'};
-  std::uint64_t bytes = 0;     // of the data, which follow
-  std::uint64_t checksum = 0;  // of the data, because drivers need not notice damage
+  std::uint64_t bytes = 0;     // size of the data, which follow
+  std::uint64_t checksum = 0;  // checksum of the data, because drivers need not notice damage
 };
 
 /// FNV-1a.

@@ -38,7 +38,7 @@ Course courseOf(const shared::RenderParams& params, const shared::RenderRays& ra
   };
   const glm::vec2 middle = placeAt(0.5F * (params.nearest + params.farthest));
   const glm::vec3 along = parallel ? glm::vec3(0.0F, 0.0F, 1.0F) : glm::vec3(middle, 1.0F);
-  constexpr float cosine = 0.9914F;  // of 7.5 degrees
+  constexpr float cosine = 0.9914F;  // cosine of 7.5 degrees
   return {glm::dot(glm::normalize(rays.directionBase), glm::normalize(along)) > cosine,
           glm::abs(placeAt(params.farthest) - placeAt(params.nearest)) / params.pixelSize};
 }

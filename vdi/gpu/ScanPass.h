@@ -38,7 +38,7 @@ class ScanPass {
 
   std::shared_ptr<Device> device_;
   PipelineSet pipelines_;  // without guard, with one, and with one that depends on another
-  Buffer sums_;            // of workgroups
+  Buffer sums_;            // sums of workgroups
   /// Buffers that were too small for a later scan, kept because recorded commands may use them. They are few
   /// and small, since each is half as large again as the one before.
   std::vector<Buffer> outgrown_;

@@ -20,7 +20,7 @@ struct ValueMap {
   double scale = 1.0;
   double offset = 0.0;
   bool whole = false;                // values are integers
-  std::optional<ScalarRange> range;  // of finite values, if it had to be computed
+  std::optional<ScalarRange> range;  // range of finite values, if it had to be computed
 };
 /// Throws Error{InvalidArgument} for values beyond limitsOf(type).maximum.
 ValueMap valueMapOf(const Block& block);

@@ -112,7 +112,7 @@ void VolumeStore::lay(Step& step, std::span<const Block> blocks, const Scene& sc
   step.tree.clear();
   step.blocks.assign(blocks.begin(), blocks.end());
   std::vector<VolumePiece> pieces;
-  std::vector<PieceRange> piecesOf;  // of each block
+  std::vector<PieceRange> piecesOf;  // pieces of each block
   // Blocks that share values (the parts of a box with holes) share their pieces.
   using Key = std::tuple<const void*, std::array<std::int64_t, 3>, const void*, std::array<double, 3>>;
   std::map<Key, PieceRange> known;

@@ -100,7 +100,7 @@ class VolumeStore {
     std::vector<shared::KdNode> tree;
     std::vector<shared::CellPiece> cellPieces;  // one per piece; placeTable sets the table fields
     std::uint32_t cellCount = 0;
-    ScalarRange range;      // of finite values
+    ScalarRange range;      // range of finite values
     bool infinite = false;  // whether some values are infinite
     Buffer cellPieceBuffer;
     Buffer rangeBuffer;
@@ -131,7 +131,7 @@ class VolumeStore {
   std::uint64_t pagesVersions_ = 0;
   TransferTable table_;
   CellsPass cellsPass_;
-  Buffer pieceRanges_;  // for reading back
+  Buffer pieceRanges_;  // ranges read back from the device
   Buffer visibleBeforeBuffer_;
   SlabTable slabTable_;
   SampledImage slabs_;

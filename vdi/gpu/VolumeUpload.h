@@ -25,7 +25,7 @@ class VolumeUpload {
   /// Call before each run: its copies wait on the device for the last submission of `before`.
   void begin(const Commands& before);
   /// Copies the pieces to their places in the pages, which stay ready to be sampled. Returns when all values
-  /// are there; then host data is not needed any more. Any thread may call it, while others use the device.
+  /// are copied; host data is not needed afterwards. Any thread may call it while others use the device.
   void run(std::span<const VolumePiece> pieces, std::span<const SampledImage> pages);
   /// The commands that run submitted last, for other queues to wait for.
   const Commands& last() const { return halves_[current_].commands; }

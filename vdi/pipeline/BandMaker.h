@@ -124,7 +124,7 @@ class BandMaker {
   comm::ByteSum levelSum_;
   HostAccesses accesses_;  // to the memory of levelSum_
   std::array<Slot, RayCaster::bandsAtOnce> slots_;
-  std::size_t firstSlot_ = 0;  // of the current frame's first band
+  std::size_t firstSlot_ = 0;  // slot of the current frame's first band
   std::vector<MergedBand> merged_;
 };
 

@@ -24,7 +24,7 @@ class Compositor {
     std::uint32_t maxPerList = 1;  // N_S, or more with a level
     double sampleStep = 1.0;
     Algorithm algorithm = Algorithm::Merge;
-    DepthCode code;       // of compact lists
+    DepthCode code;       // code of compact lists
     float level = -1.0F;  // with Budget::Total, from the histogram of all owners
   };
 
@@ -59,7 +59,7 @@ class Compositor {
   void recordInterleave(gpu::Commands& commands, const gpu::shared::InterleaveConstants& constants);
   void wait();
   void noteTimes();
-  std::vector<HostAccess*> receivedFrom_;  // by the merge under way
+  std::vector<HostAccess*> receivedFrom_;  // memory that the merge under way reads
   bool merging_ = false;
   bool flattening_ = false;
   bool building_ = false;

@@ -51,7 +51,7 @@ struct DownloadMemory {
   std::array<gpu::Commands, 2> transfers;  // taken in turns
   gpu::Commands commands;
   gpu::ScanPass scan;
-  gpu::Buffer offsets;  // of all bands
+  gpu::Buffer offsets;  // offsets of all bands
 };
 
 /// Downloads lists to the host, band after band, while the device makes the next ones. Supersegments are sent
@@ -93,7 +93,7 @@ class ListDownload {
   HostPool& pool_;
   DownloadMemory& memory_;
   std::uint64_t listCount_;
-  std::uint64_t firstList_ = 0;  // of the next band
+  std::uint64_t firstList_ = 0;  // first list of the next band
   std::vector<Band> bands_;
 };
 

@@ -16,12 +16,12 @@
 
 namespace vdi::detail {
 
-/// Host memory that a device can access, kept as long as anybody else uses it.
+/// Host memory that a device can access, kept as long as something else uses it.
 class HostAccesses {
  public:
   explicit HostAccesses(std::shared_ptr<gpu::Device> device) : device_(std::move(device)) {}
   HostAccess& of(const std::shared_ptr<HostMemory>& memory);
-  /// Forgets memory that nobody else uses any more.
+  /// Forgets memory that nothing else uses any more.
   void tidy();
 
  private:

@@ -88,7 +88,7 @@ class Gather {
   std::vector<Array> arrays_;
   std::vector<Message> messages_;
   std::shared_ptr<OpenedMemory> opened_;  // the root's
-  std::unique_ptr<HostAccess> outbox_;    // for messages
+  std::unique_ptr<HostAccess> outbox_;    // memory for messages
   std::uint64_t bytesSent_ = 0;
 };
 

@@ -17,7 +17,7 @@ namespace vdi::detail {
 
 /// A band's lists that this rank owns.
 struct OwnedLists {
-  std::uint64_t firstList = 0;  // in the picture
+  std::uint64_t firstList = 0;  // position in the picture
   DeviceLists lists;
 };
 

@@ -72,7 +72,7 @@ class ListBuilder {
     Algorithm algorithm = Algorithm::Merge;
     gpu::ReducePass::MaxPerList maxPerList;
     double sampleStep = 1.0;
-    DepthCode code;  // of compact lists
+    DepthCode code;  // code of compact lists
     /// Merging with other ranks: the agreed values of the counted lists (shaders/shared/quota.h), which are
     /// not counted again. They begin with the band's first list.
     struct Agreed {
@@ -169,7 +169,7 @@ class ListBuilder {
   gpu::Buffer statusReadback_;
   gpu::Buffer preSegmentsFit_;  // guards: shaders/shared/scan.h
   gpu::Buffer segmentsFit_;
-  gpu::Buffer totals_;  // of pre-segments, then of supersegments
+  gpu::Buffer totals_;  // numbers of pre-segments, then of supersegments
   /// Runs per list of a flat picture for which memory is reserved. Once a list has more, `expectedRuns_`
   /// grows.
   static constexpr std::uint32_t fewRuns = 3;

@@ -17,7 +17,7 @@ struct DepositedArray {
   /// owners' values. Cells that finer blocks hide have the mean of the finer values. A sum over a block
   /// counts both twice.
   std::vector<std::shared_ptr<float[]>> values;
-  ParticleCounts counts;  // of all ranks
+  ParticleCounts counts;  // counts over all ranks
 };
 
 /// vdi/core/Particles.h has the rules of the deposit. A rank's particles may lie in any rank's blocks. The

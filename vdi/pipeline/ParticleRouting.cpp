@@ -61,12 +61,12 @@ void forEachPiece(const IndexBox& box, int most, Visit visit) {
 
 /// Indices count parts of cells from the block's lower corner.
 struct ParticleRouting::Cells {
-  glm::ivec3 parts{1};  // of a cell, per axis
-  glm::dvec3 spacing;   // of the parts
+  glm::ivec3 parts{1};  // parts of a cell, per axis
+  glm::dvec3 spacing;   // spacing of the parts
   glm::dvec3 at;        // the particle's position
-  glm::dvec3 reach;     // of the particle
+  glm::dvec3 reach;     // reach of the particle
   IndexBox all;         // parts that the particle meets, inside the block or not
-  IndexBox stored;      // those inside
+  IndexBox stored;      // parts of `all` inside the block
 
   Cells(const Spread& spread, const Place& place) {
     if (spread.h > 0.0) {
@@ -245,7 +245,7 @@ bool ParticleRouting::isWithinOneLattice(const Spread& spread, std::span<const P
 /// The sum of the particle's shares over all owned cells.
 double ParticleRouting::sumOf(const Spread& spread, std::span<const Place* const> met) const {
   double sum = 0.0;
-  std::array<std::vector<double>, 3> shares;  // of each part, by its index in the range
+  std::array<std::vector<double>, 3> shares;  // share of each part, by its index in the range
   for (const Place* one : met) {
     const Place& place = *one;
     const Cells cells(spread, place);

@@ -49,7 +49,7 @@ class ParticleRouting {
     Box stored{};                     // all cells
     std::vector<std::size_t> near{};  // places that a cloud around a position in `owned` may meet
   };
-  /// How a particle spreads.
+  /// The spread of a particle.
   struct Spread {
     const Place* owner;
     glm::dvec3 position;

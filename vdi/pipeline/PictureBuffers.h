@@ -29,7 +29,7 @@ class PictureBuffers {
 
  private:
   std::uint64_t pixels_ = 0;
-  std::uint64_t colorBytes_ = 0;  // of all pixels
+  std::uint64_t colorBytes_ = 0;  // bytes of all pixels' colours
   gpu::Buffer colors_;
   gpu::Buffer depths_;
   gpu::Buffer readback_;  // colours, then depths

@@ -41,7 +41,7 @@ class RayCaster {
     const GenerateSettings& settings;
     bool cutAtGaps;
     bool runsOnly;   // one supersegment per run, without a search
-    DepthCode code;  // of compact lists
+    DepthCode code;  // code of compact lists
   };
   /// Called with the finished share; returning false ends the work early with the present result.
   using Progress = std::function<bool(double)>;
@@ -97,7 +97,7 @@ class RayCaster {
   struct PixelArray {
     gpu::Buffer& buffer;
     std::byte* host;      // from a HostPool
-    std::uint64_t bytes;  // of a pixel
+    std::uint64_t bytes;  // size of a pixel's value
     std::uint64_t gpu::shared::CastParams::*address;
   };
   void castPixels(const Inputs& inputs, const Progress& progress, HostPool& pool,

@@ -10,7 +10,7 @@ namespace vdi {
 
 /// Wall-clock seconds and bytes of one rank in the last frame.
 struct RankReport {
-  double uploadSeconds = 0.0;          // of setBlocks, or setNextBlocks and advance, since the last frame
+  double uploadSeconds = 0.0;          // setBlocks, or setNextBlocks and advance, since the last frame
   double generateSeconds = 0.0;        // casting and segmenting, transfers included
   double generateDeviceSeconds = 0.0;  // device work in generateSeconds, without transfers
   /// Device work of the first step: bisection's search or the counting of pre-segments.
@@ -20,13 +20,13 @@ struct RankReport {
   double compositeSeconds = 0.0;
   double compositeDeviceSeconds = 0.0;  // device work in compositeSeconds, and copies of received lists
   double gatherSeconds = 0.0;
-  double outputSeconds = 0.0;    // of write, in place of the gather: download, encoding and writing
-  double samplesPerVoxel = 0.0;  // of the frame, also with automaticRate
+  double outputSeconds = 0.0;    // time of write, in place of the gather: download, encoding, writing
+  double samplesPerVoxel = 0.0;  // rate of the frame, also with automaticRate
   std::uint64_t blocks = 0;
   std::uint64_t volumeBytes = 0;
   std::uint64_t subSupersegments = 0;
   std::uint64_t bytesSent = 0;
-  std::uint64_t bytesWritten = 0;   // by write, into the file, from this rank
+  std::uint64_t bytesWritten = 0;   // bytes that write put into the file from this rank
   std::uint64_t deviceBytes = 0;    // device memory held
   std::uint64_t hostPeakBytes = 0;  // peak host memory of the process, shared memory included
 };

@@ -113,7 +113,7 @@ struct VdiGenerator::State {
 
   std::shared_ptr<gpu::Device> device;
   comm::Communicator comm = comm::Communicator::serial();  // until it begins
-  std::shared_ptr<detail::HostPool> pool;                  // of VDIs and pictures
+  std::shared_ptr<detail::HostPool> pool;                  // memory of VDIs and pictures
   std::unique_ptr<detail::BandMaker> bands;
   std::unique_ptr<detail::TimeSteps> steps;
   std::unique_ptr<detail::Frames> frames;

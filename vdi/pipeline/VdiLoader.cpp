@@ -101,7 +101,7 @@ void VdiLoader::recordSegments(VkDeviceAddress from, std::uint64_t first, std::u
   expand_.record(commands_, constants);
 }
 
-/// Call when all supersegments are there.
+/// Call when all supersegments are on the device.
 void VdiLoader::recordMasks() {
   const shared::DepthRange nothing{std::numeric_limits<float>::infinity(), 0.0F, 0.0F};
   commands_.update(target_->depthRange, std::as_bytes(std::span(&nothing, 1)));

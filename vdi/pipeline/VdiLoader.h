@@ -26,7 +26,7 @@ struct LoadedVdi {
   gpu::Buffer depthRange;          // shared::DepthRange
   gpu::Buffer depthRangeReadback;  // the same, for the host
   gpu::Buffer boxFaces;            // shared::renderFaces vec4, once it leans
-  BoxFaces faces{};                // of the VDI's box, in the view space of V_O
+  BoxFaces faces{};                // faces of the VDI's box, in the view space of V_O
   double depthStep = 0.0;          // DepthCode::step
   std::unique_ptr<View> original;  // null until a VDI is loaded
   bool leans = false;              // whether recordLeaning has been called for it
@@ -80,12 +80,12 @@ class VdiLoader {
   gpu::Buffer staging_;
   gpu::Buffer offsets_;
   gpu::Buffer outgrown_;
-  std::uint64_t stagingBytes_ = 0;  // in use, of the staging buffer
+  std::uint64_t stagingBytes_ = 0;  // size of the part of the staging buffer in use
   std::uint64_t stagingUsed_ = 0;
   LoadedVdi* target_ = nullptr;
   gpu::shared::ExpandConstants constants_{};
   std::uint64_t listCount_ = 0;
-  std::uint64_t segmentBytes_ = 0;  // of one supersegment
+  std::uint64_t segmentBytes_ = 0;  // size of one supersegment
   std::uint64_t added_ = 0;         // supersegments of the bands so far
   /// Declared after the buffers, because its destructor waits for the commands that use them.
   gpu::Commands commands_;

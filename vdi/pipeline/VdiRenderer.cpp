@@ -34,7 +34,7 @@ struct VdiRenderer::State {
   detail::LoadedVdi prepared;
   double milliseconds = 0.0;
   std::vector<ClipPlane> clipPlanes;
-  gpu::Buffer ends;  // of rays; empty until requested
+  gpu::Buffer ends;  // ends of rays; empty until requested
   gpu::Buffer endsStaging;
   /// Declared after the data that it loads, because its destructor waits for its use.
   detail::VdiLoader loader;

@@ -71,7 +71,7 @@ class VdiWriter {
   struct Table {
     std::vector<io::ChunkEntry> entries;
     std::vector<int> owners;
-    std::vector<std::uint64_t> offsets;  // in the file, then its end
+    std::vector<std::uint64_t> offsets;  // offsets of the chunks in the file, then their end
   };
 
   bool isRoot() const { return comm_.rank() == root_; }

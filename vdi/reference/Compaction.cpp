@@ -63,7 +63,7 @@ class Compactor {
   DepthCode code_;
   std::uint32_t reach_ = 0;
   float depth_ = 0.0F;        // optical depth so far
-  float storedDepth_ = 0.0F;  // of the stored supersegments
+  float storedDepth_ = 0.0F;  // optical depth of the stored supersegments
   float carriedDepth_ = 0.0F;
   glm::vec3 carriedLight_{0.0F};
 };

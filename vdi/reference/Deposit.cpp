@@ -65,7 +65,7 @@ double cubicSpline(double r, double h) {
 /// The spread of a particle of weight 1, before its shares are divided by their sum.
 struct Spread {
   glm::dvec3 position;
-  glm::dvec3 spacing;  // of the owner's cells
+  glm::dvec3 spacing;  // spacing of the owner's cells
   double h = 0.0;      // 0: cloud in cell
 
   glm::dvec3 reach() const { return h > 0.0 ? glm::dvec3(2.0 * h) : 0.5 * spacing; }

@@ -392,7 +392,7 @@ std::vector<SupersegmentLists> generateTogether(const RayInputs& inputs,
   const int height = inputs.view.height();
   const int countedWidth = (width + stride - 1) / stride;
   const int countedHeight = (height + stride - 1) / stride;
-  std::vector<std::vector<ListTolerance>> agreed(ranks.size());  // of each rank's counted lists
+  std::vector<std::vector<ListTolerance>> agreed(ranks.size());  // tolerances of each rank's counted lists
   for (int y = 0; y < countedHeight; ++y) {
     for (int x = 0; x < countedWidth; ++x) {
       std::vector<CountedLevels> levels;

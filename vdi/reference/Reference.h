@@ -25,7 +25,7 @@ namespace vdi::reference {
 
 /// Data that all rays of a frame share.
 struct RayInputs {
-  Scene scene;  // of all ranks
+  Scene scene;  // scene of all ranks
   View view;
   DepthLattice lattice;
   TransferTable table;

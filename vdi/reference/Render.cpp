@@ -76,7 +76,7 @@ struct LeaningLists {
   const SupersegmentLists& lists;
   std::vector<Slopes> slopes;  // empty: faces do not slope
   float slopeUnit = 0.0F;
-  BoxFaces faces{};  // of the box around the lists; all 0: of all space
+  BoxFaces faces{};  // faces of the box around the lists; all 0: of all space
 };
 
 /// The part of a ray's stretch that lies within a supersegment, as fractions of the stretch.
