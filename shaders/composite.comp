@@ -1,5 +1,4 @@
-// Segments interleaved lists again, to at most N_S supersegments each. The intervals of these lists are
-// sub-supersegments.
+// Segments interleaved lists again, to at most N_S supersegments each. Their intervals are sub-supersegments.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/composite.h"

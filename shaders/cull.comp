@@ -67,8 +67,7 @@ Reach reachOf(RayPacket packet) {
   vec4 depthsOut = originZ + stretch.y * directionZ;
   Reach reach =
       Reach(stretch.x, stretch.y, vec2(0.0), vec2(params.lists), vec2(params.nearest, params.farthest));
-  // If this fails, the bounds stay those of the whole picture: points beside V_O's eye project without
-  // bounds.
+  // Else the bounds stay those of the whole picture: points beside V_O's eye project without bounds.
   const float finite = 1e30;
   if (stretch.y < finite && (parallel || min(minimum(depthsIn), minimum(depthsOut)) > 0.0)) {
     vec4 pixelsIn = 1.0 / (params.pixelSize * (parallel ? vec4(1.0) : depthsIn));

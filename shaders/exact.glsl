@@ -1,5 +1,4 @@
-// Converts an integer below 2^23 to a float by setting the mantissa, which is faster on a GPU than a
-// conversion.
+// Converts an integer below 2^23 to a float through the mantissa, which GPUs do faster than a conversion.
 #ifndef VDI_EXACT_GLSL
 #define VDI_EXACT_GLSL
 

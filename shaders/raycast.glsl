@@ -73,8 +73,7 @@ uvec2 samplesIn(vec3 lo, vec3 hi) {
 // The bounds of the visible part (scene or region) seldom lie half-way between two samples. The outermost
 // samples represent what is really there: the first one's interval starts where the ray enters, the last
 // one's ends where it leaves. With whole samples, the faces of a filled box would show the sample lattice as
-// stripes. The intervals depend on the ray, the scene and the region alone, so they are the same on every
-// rank.
+// stripes. The intervals depend only on ray, scene and region, so they are the same on every rank.
 //
 // If a ray leaves the bounds before it reaches the middle of any sample, the part between is one sample, and
 // its middle decides its owner. Without this sample, the edges of a filled box would be jagged.
@@ -107,8 +106,7 @@ void setUpScene() {
   rayEnter = params.first + (grazes ? enter : clamp(enter, first - params.step, first));
   rayLeave = params.first + (grazes ? leave : clamp(leave, last, last + params.step));
   rayLeave = max(rayLeave, rayEnter + 0.001 * params.step);
-  // No block has values farther away. Without this limit, the picture would depend on which block owns the
-  // sample.
+  // Beyond this reach, no block has values, and the picture would depend on the owner of the sample.
   vec3 size = abs(rayDirection);
   float reach = max(params.reach / max(max(size.x, size.y), size.z), 0.5);
   rayBegin = max((rayEnter - params.first) / params.step, middleOf(rayScene.x) - reach);

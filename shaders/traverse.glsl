@@ -110,8 +110,7 @@ uint listsToIntersect(PictureLine line, int tile) {
       uint64_t secondMask = params.heads.at[here.lists.y].mask;
       vec2 bins = vec2(at(line.bins, fraction), at(line.bins, nextFraction));
       // Products, because && would branch: all masks are requested before the first one is awaited. If the
-      // picture ends within a tile, rounding may let a line that leaves the picture reach a column outside
-      // it.
+      // picture ends within a tile, rounding may let a line that leaves it reach a column outside.
       uint passes = uint(nextEdge != edge) * uint(column <= maximum);
       uint meetsFirst = passes * uint(here.share < 1.0) * uint(mayMeet(firstMask, bins));
       uint meetsSecond = passes * uint(here.share > 0.0) * uint(mayMeet(secondMask, bins));

@@ -62,8 +62,7 @@ struct DepthRange {
 
 // The data of a list that a ray reads first: the position of its supersegments in the compact array, and its
 // mask. `countAndReach` has the number of supersegments in its low listCountBits bits, and above them the
-// distance by which leaning faces reach beyond their depths in the list's middle, in units of listReachUnit
-// slopes.
+// reach of leaning faces beyond their depths in the list's middle, in units of listReachUnit slopes.
 VDI_CONST uint listCountBits = 24;
 VDI_CONST float listReachUnit = 2.0F;
 struct ListHead {

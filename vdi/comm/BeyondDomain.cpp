@@ -27,7 +27,7 @@ double limitedDifference(double last, double before) {
 /// Number of values that determine the next one along an axis.
 constexpr int deciding = 3;
 
-/// Patches with the values around them that determine their open places.
+/// Patches with the values around them, which determine their open places.
 struct Window {
   IndexBox box;
   std::array<std::ptrdiff_t, 3> strides{};  // distances between neighbours along each axis

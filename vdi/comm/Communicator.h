@@ -111,7 +111,7 @@ class Communicator {
     std::uint64_t value;
     const char* what;
   };
-  /// Compares several values at once. `work` returns them under the rules of together; the error names all
+  /// Compares several values at once. `work` returns them under the rules of together; the error names those
   /// that differ.
   void requireEqual(FunctionRef<std::vector<Fingerprint>()> work) const;
 
@@ -138,8 +138,7 @@ class Messages {
   Messages& operator=(Messages&&) = delete;
 
   /// Takes the memory for one more message, sent or received, of `bytes` bytes. Call it for each message
-  /// within together(), before the first is sent: other ranks would wait for messages of a rank without
-  /// memory.
+  /// within together(), before the first is sent: other ranks would wait for a rank without memory.
   void reserve(std::uint64_t bytes);
   void send(int to, std::span<const std::byte> bytes);
   void receive(int from, std::span<std::byte> bytes);

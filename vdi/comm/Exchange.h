@@ -28,8 +28,8 @@ class Exchange {
     std::uint64_t at = 0;
   };
   /// Collective. Returns the place for this rank's outgoing data, of at least `bytes`; this is the previous
-  /// one if that is large enough. Invalidates the received data, on all ranks. All ranks throw if one is out
-  /// of memory.
+  /// one if that is large enough. Invalidates the received data on all ranks. All ranks throw if one lacks
+  /// memory.
   Place outbox(std::uint64_t bytes);
 
   using Note = std::array<std::uint64_t, 2>;  // for the receiver, with any meaning

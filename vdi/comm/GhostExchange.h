@@ -49,8 +49,8 @@ std::vector<Block> settleOwnership(const Communicator& comm, std::vector<Block> 
 ///
 /// Cost. Each rank plans for its own blocks. Descriptions of all blocks are gathered, some 200 bytes each.
 /// Values are requested and sent once, and once more for each level in which others interpolate. A block
-/// takes time and some 120 bytes for each neighbour with values around it; beside finer blocks, it has
-/// thousands of neighbours.
+/// takes time and some 120 bytes for each neighbour with values around it, of which there are thousands
+/// beside finer blocks.
 std::vector<Block> exchangeGhosts(const Communicator& comm, std::vector<Block> blocks);
 
 }  // namespace vdi::comm

@@ -18,8 +18,7 @@ void convert(ScalarType type, const void* row, int first, std::span<const int> i
 
 }  // namespace
 
-/// Takes the values that lie in `box`. rowAt(at, end) returns the values of a row from index `at` to before x
-/// = `end`.
+/// Takes the values that lie in `box`. rowAt(at, end) returns a row's values from `at` to before x = `end`.
 template <typename RowAt>
 void LocalValues::take(ScalarType type, const IndexBox& box, const Indices& indices, RowAt rowAt) {
   std::array<std::size_t, 3> first{};

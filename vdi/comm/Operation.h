@@ -24,8 +24,7 @@ struct Operation {
   void carry(const char* name) const;
 };
 
-/// Calls a collective with `arguments`: `blocking`, or within a Funnel `starting`, which also takes a
-/// request.
+/// Calls a collective with `arguments`: `blocking`, or in a Funnel `starting`, which also takes a request.
 template <typename Blocking, typename Starting, typename... Arguments>
 void call(const char* name, Blocking blocking, Starting starting, Arguments... arguments) {
   if (!Operation::isCarried()) return check(blocking(arguments...), name);

@@ -26,9 +26,8 @@ BlendMode blendModeFromString(const std::string& name);
 inline constexpr std::size_t maxIsovalues = 16;
 
 /// The blend mode and its isovalues, with the rules of VTK's volume mapper: except in composite blending, the
-/// opacity function alone gives a scalar's opacity, regardless of the unit distance. Isosurfaces are shaded
-/// if shading is on; maxima and minima never are. NaN is neither a maximum nor a minimum, and crosses no
-/// isovalue.
+/// opacity function alone gives a scalar's opacity, at any unit distance. Isosurfaces are shaded if shading
+/// is on; maxima and minima never are. NaN is no maximum or minimum, and crosses no isovalue.
 struct Blending {
   BlendMode mode = BlendMode::Composite;
   std::vector<double> isovalues;  // Isosurface: 1 .. maxIsovalues, in any order
@@ -45,8 +44,7 @@ struct Isosurface {
 /// The isosurfaces in ascending order; none unless the mode is Isosurface.
 std::vector<Isosurface> isosurfacesOf(const Blending& blending, const TransferTable& table);
 
-/// Throws Error{InvalidArgument} for isovalues that are missing, too many, not finite, or not used by the
-/// mode.
+/// Throws Error{InvalidArgument} for isovalues that are missing, too many, not finite, or unused.
 void validate(const Blending& blending);
 
 /// Throws Error{InvalidArgument} unless the mode is one that a VDI holds.

@@ -51,8 +51,8 @@ std::vector<IndexBox> coverWithBoxes(const glm::ivec3& size, std::vector<bool> o
 
 namespace {
 
-/// Limit on the cells of one lattice. The holes' faces cut the box into cells, each wholly inside or outside
-/// the holes.
+/// Limit on the cells of one lattice. Faces of holes cut the box into cells, each wholly in or out of the
+/// holes.
 constexpr std::size_t maxCells = std::size_t{1} << 22;
 
 std::vector<Box> cut(const Box& box, const std::vector<Box>& holes) {

@@ -11,8 +11,7 @@ namespace vdi {
 
 enum class Budget : std::uint32_t {
   List = 0,  // up to N_S each, as in the paper
-  /// All lists together hold as many as with N_S each. Complex lists get more, up to maxPerList, others
-  /// fewer.
+  /// All lists together hold as many as with N_S each. Complex lists get up to maxPerList, others fewer.
   Total = 1,
 };
 

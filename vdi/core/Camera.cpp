@@ -17,8 +17,7 @@ double radians(double degrees) {
   return degrees * std::numbers::pi / 180.0;
 }
 
-/// View-up scaled to length 1, without overflow for any length; the y axis if it is zero, as in
-/// vtkCamera::SetViewUp.
+/// View-up scaled to length 1, without overflow; the y axis if it is zero, as in vtkCamera::SetViewUp.
 glm::dvec3 unitUp(const glm::dvec3& up) {
   const glm::dvec3 magnitude = glm::abs(up);
   const double largest = std::max({magnitude.x, magnitude.y, magnitude.z});

@@ -27,8 +27,7 @@ class Descriptor {
   int number() const { return number_; }
   bool isOpen() const { return number_ >= 0; }
   int release() { return std::exchange(number_, -1); }
-  /// Closes the descriptor now and returns the result of close(): some file systems report a full disk only
-  /// then.
+  /// Closes the descriptor and returns the result of close(): some file systems report a full disk only then.
   int close() { return ::close(release()); }
 
  private:

@@ -1,6 +1,5 @@
 // The encodings of supersegments: the types that hold them in memory, between ranks and in files, and the
-// facts about each that the rest of the library needs. docs/architecture.md lists the other code that depends
-// on an encoding.
+// facts that other code needs about each. docs/architecture.md lists the other places of an encoding.
 #pragma once
 
 #include <cassert>

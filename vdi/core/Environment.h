@@ -16,8 +16,7 @@ struct EnvironmentVariable {
   bool forUsers;        // false: for tests and measurements
 };
 
-/// All variables, sorted by name. The user guide's table lists them, too; `vdi --help` lists those with
-/// forUsers.
+/// All variables, sorted by name. The user guide lists them, too; `vdi --help` lists those with forUsers.
 std::span<const EnvironmentVariable> environmentVariables();
 
 /// The value of a variable in the table; nullopt if it is unset or empty.

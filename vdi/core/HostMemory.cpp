@@ -44,8 +44,7 @@ std::span<std::byte> map(std::uint64_t size, int flags, int descriptor, const ch
 const std::string folder = "/dev/shm";
 constexpr std::string_view prefix = "/pv-vdi-";
 
-/// Unlinks the memory of processes that were killed before they unlinked it. A live process holds a lock on
-/// its memory.
+/// Unlinks the memory that killed processes have left. A live process holds a lock on its memory.
 void removeNamesOfTheDead() {
   std::error_code unreadable;
   using Iterator = std::filesystem::directory_iterator;

@@ -15,8 +15,7 @@ namespace vdi {
 ///   * the extent of the scene's box in the image plane, so that a scene wholly in the picture has no margin;
 ///   * the largest margin for which samples are slabs, if the picture's samples are slabs (samplesAreSlabs);
 ///     a larger one would change the picture.
-/// The result depends only on the arguments, so all ranks get the same margin. Throws as View and
-/// depthLattice do.
+/// It depends only on the arguments, so all ranks get the same margin. Throws as View and depthLattice do.
 glm::ivec2 marginOf(const Scene& scene, const Camera& camera, const GenerateSettings& settings);
 
 /// The view of all lists that the settings ask for: the picture and its margin.

@@ -148,7 +148,7 @@ bool showsEnough(const TransferTable& table, const SlabIntegral& slabs, double m
 
 std::vector<Probe> probesOf(const Scene& scene, std::span<const Block> blocks) {
   if (scene.bounds.empty() || !(scene.minSpacing > 0.0)) return {};
-  // Sorted by x, so that a block searches only the places between its faces.
+  // Sorted by x: a block searches only the places between its faces.
   std::vector<std::pair<Place, std::size_t>> places;
   places.reserve(probeCount);
   for (std::size_t index = 0; index < probeCount; ++index) places.emplace_back(placeOf(scene, index), index);

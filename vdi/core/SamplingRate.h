@@ -22,8 +22,7 @@ struct Probe {
   std::array<double, 5> scalars{};
 };
 
-/// The probes of the scene whose places the blocks own, sorted by index. The blocks must have their
-/// neighbours' values.
+/// The probes whose places the blocks own, sorted by index. The blocks must have their neighbours' values.
 std::vector<Probe> probesOf(const Scene& scene, std::span<const Block> blocks);
 
 /// 1, 2 or 4 samples per voxel: the first rate at which a slab shows what its two halves show. A slab assumes

@@ -39,8 +39,7 @@ struct DepthLattice {
 /// [1/64, 64] or when a ray would need more than 2^24 samples.
 DepthLattice depthLattice(const Scene& scene, const View& view, double samplesPerVoxel);
 
-/// Whether single-precision depths distinguish the lattice's first samples. They don't if the camera is far
-/// away.
+/// Whether depths as floats distinguish the lattice's first samples. They don't if the camera is far away.
 bool floatsResolve(const DepthLattice& lattice);
 
 /// The distance, in spacings, up to which a block has values beyond its owned box where it has neighbours.

@@ -51,8 +51,7 @@ std::size_t indexOfSetting(std::string_view property);
 /// "--termination-opacity"
 std::string optionOf(const Setting& setting);
 
-/// Checks all settings, in the table or not. Throws Error{InvalidArgument} naming the setting, its value and
-/// its range.
+/// Checks all settings. Throws Error{InvalidArgument} naming the setting, its value and its range.
 void validate(const GenerateSettings& settings);
 
 }  // namespace vdi

@@ -72,8 +72,7 @@ namespace {
 /// Limits colours to white, also after rounding to half floats.
 glm::u16vec4 texelOf(const glm::dvec4& slab) {
   const glm::u16vec4 half = toHalf(glm::vec4(slab));
-  // Compares numbers, not bits: a falling slab gives -0 to a channel of 0, and the bits of -0 exceed all
-  // others.
+  // Compares numbers: a falling slab gives -0 to a channel of 0, and the bits of -0 exceed all others.
   const glm::vec4 rounded = fromHalf(half);
   return toHalf(glm::max(glm::min(rounded, glm::vec4(rounded.a)), glm::vec4(0.0F)));
 }

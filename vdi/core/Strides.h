@@ -44,12 +44,11 @@ inline int fastestAxis(const ByteStrides& strides) {
 }
 
 /// Divides a box of values into tiles. A tile's gathered values stay in the core's own cache. A tile is long
-/// along the axis on which its values are adjacent, where memory is read fastest, and has whole cache lines
-/// along x for writing.
+/// along the axis of adjacent values, for fast reading, and has whole cache lines along x, for writing.
 class Tiling {
  public:
   static constexpr int width = 16;     // along x if another axis is the fastest
-  static constexpr int values = 4096;  // most values in a tile
+  static constexpr int values = 4096;  // limit for one tile
 
   Tiling(const IndexBox& box, int fastest) : box_(box), tile_(1) {
     const glm::ivec3 size = box.size();
@@ -77,8 +76,7 @@ class Tiling {
 
 namespace detail {
 
-/// The innermost loop follows the fastest axis of `from`; the next loop follows the faster of the others in
-/// `to`.
+/// The innermost loop follows the fastest axis of `from`, the next loop the faster of the others in `to`.
 template <std::size_t bytes>
 void copyTile(const std::byte* from, const ByteStrides& fromStrides, std::byte* to,
               const ByteStrides& toStrides, const glm::ivec3& size) {

@@ -34,9 +34,8 @@ std::optional<ViewpointIssue> viewpointIssue(const Box& bounds, const View& orig
 /// The angle, in degrees, between the directions in which `original` and `camera` see the scene's centre.
 double degreesBetween(const Box& bounds, const Camera& original, const Camera& camera);
 
-/// The number of lists in a row across the view, at the depth of the scene's centre. It equals V_O's number
-/// if both views see equal widths, and is smaller in a nearer view. 0 if the centre isn't in front of the
-/// view.
+/// The number of lists in a row across the view, at the depth of the scene's centre. It equals V_O's if both
+/// views see equal widths, and is smaller in a nearer view. 0 if the centre isn't in front.
 double listsAcross(const Box& bounds, const View& original, const View& view);
 
 /// The issue in words, for a warning.

@@ -16,7 +16,7 @@ struct DeviceLimits {
   std::uint64_t maxAllocationBytes = 0;
   std::uint64_t maxBufferBytes = 0;
   std::uint32_t maxImageDimension3D = 0;
-  std::array<std::uint32_t, 3> maxGroups{};  // most workgroups of one dispatch, per axis
+  std::array<std::uint32_t, 3> maxGroups{};  // limit on the workgroups of one dispatch, per axis
   float timestampPeriodNs = 0.0F;
   std::uint32_t timestampBits = 0;  // number of valid low bits; the clock wraps around
   /// Required alignment of the start and the size of imported host memory; 0: the device cannot import any.

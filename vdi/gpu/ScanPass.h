@@ -21,8 +21,8 @@ class ScanPass {
   /// of this pass may be running.
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count);
   /// Also records whether the total fits: `guard` (a word) becomes 1 if the total is at most `room` and the
-  /// word `before`, if given, is 1; else 0. Later dispatches read it and do nothing if it is 0, before the
-  /// host has seen the total.
+  /// word `before`, if given, is 1; else 0. Later dispatches do nothing if it is 0, before the host has the
+  /// total.
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count,
               const Buffer& guard, std::uint64_t room, const Buffer* before = nullptr);
 

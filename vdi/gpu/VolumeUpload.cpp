@@ -25,8 +25,7 @@ constexpr std::size_t maxImports = 256;
 /// Below this number of cores, copying values takes longer than pinning their pages.
 constexpr std::size_t coresThatCopyFaster = 2;
 
-/// Makes infinite texels finite: they would turn everything interpolated with them into NaN, even with weight
-/// 0.
+/// Makes infinite texels finite: they would turn what is interpolated with them into NaN, even with weight 0.
 float filterable(float texel) {
   const auto infinite = bit_cast<float>(shared::infiniteTexelBits);
   return std::isinf(texel) ? std::copysign(infinite, texel) : texel;

@@ -1,5 +1,5 @@
-// Deposition of particles on cells in double precision, with which tests compare the device's on any number
-// of ranks. vdi/core/Particles.h has the rules.
+// Deposition of particles on cells in double precision, for comparison with devices on any number of ranks.
+// vdi/core/Particles.h has the rules.
 #pragma once
 
 #include <span>

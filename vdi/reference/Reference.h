@@ -51,8 +51,7 @@ std::vector<Interval> castRay(const RayInputs& inputs, std::span<const Block> bl
 std::optional<Projection::Extreme> projectRay(const RayInputs& inputs, std::span<const Block> blocks, int x,
                                               int y);
 
-/// DVR: the ground truth, in any blend mode. Depths are as in Image; an extreme has the depth at which it
-/// first occurs.
+/// DVR: the ground truth, in any blend mode. Depths as in Image; an extreme has that of its first occurrence.
 Image renderVolume(const RayInputs& inputs, std::span<const Block> blocks);
 
 /// The (sub-)VDI of these blocks, one list per pixel. SegmentRules describes `cutAtGaps`; pass false if these

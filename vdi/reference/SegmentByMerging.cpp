@@ -245,8 +245,7 @@ std::size_t visibleSamples(std::span<const Interval> intervals, std::size_t atOn
                                     [](const Interval& interval) { return interval.opticalDepth > 0.0F; }));
 }
 
-/// The number of supersegments that a list with visible intervals would have at a level of a
-/// SupersegmentHistogram.
+/// The number of supersegments of a list with visible intervals at a level of a SupersegmentHistogram.
 std::size_t supersegmentsAtLevel(std::span<const Interval> intervals, const SegmentRules& rules,
                                  std::size_t atOnce, std::size_t level) {
   std::size_t count = 1;

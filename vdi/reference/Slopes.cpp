@@ -157,7 +157,7 @@ void fade(std::span<const Supersegment> list, float footprint, std::span<Slopes>
   }
 }
 
-/// The depths at which a ray enters and leaves the box, and its rates there: distance from the face per
+/// The depths at which a ray enters and leaves the box, and its rates there, as distance from the face per
 /// depth.
 struct Passage {
   double enter = -std::numeric_limits<double>::infinity();
