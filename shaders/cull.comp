@@ -7,7 +7,7 @@
 #include "masks.glsl"
 
 layout(local_size_x = renderCullGroup) in;
-// Otherwise tiles keep their order: a CPU does not wait for the last one, and benefits from its caches.
+// If false, tiles keep their order: a CPU does not wait for the last one, and benefits from its caches.
 layout(constant_id = 0) const bool busiestFirst = true;
 // Form of the picture's colours (shared/render.h).
 layout(constant_id = 1) const uint pictureForm = renderPictureFloats;

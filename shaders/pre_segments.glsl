@@ -1,4 +1,4 @@
-// Pre-segments: runs of neighbouring intervals that deviate little from the first of them. Twin of
+// Pre-segments: neighbouring intervals that deviate little from the first of them. Twin of
 // preSegmentsOf in vdi/reference/SegmentByMerging.cpp. reduce.comp merges pre-segments into
 // supersegments.
 //

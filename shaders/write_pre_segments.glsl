@@ -1,5 +1,5 @@
 // Writes a list's pre-segments at its tolerance into its room. ListTolerance in
-// vdi/reference/Segmenter.h explains the two.
+// vdi/reference/Segmenter.h explains tolerance and room.
 //
 // The program provides params with thresholds, capacities, offsets, preSegments, written, left,
 // status, budget; where SEVERAL_RANKS is defined, quotas, too; bool cutAtGaps, constant.

@@ -31,7 +31,7 @@ VDI_CONST uint blendComposite = 0;
 VDI_CONST uint blendMaximum = 1;
 VDI_CONST uint blendMinimum = 2;
 VDI_CONST uint blendIsosurface = 3;
-// A difference between two values below this share of them counts as rounding (core/Shading.h).
+// A difference smaller than this share of two values counts as rounding error (core/Shading.h).
 VDI_CONST float leastGradient = 1.0e-6f;
 VDI_CONST uint castModeSearch = 0;          // sensitivities and counts
 VDI_CONST uint castModeWrite = 1;           // supersegments

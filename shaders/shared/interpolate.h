@@ -15,9 +15,9 @@ struct InterpolateConstants {
   VDI_ADDRESS(UintArray) countedPreSegments;
   VDI_ADDRESS(FloatArray) tolerances;         // [rows][width]
   VDI_ADDRESS(UintArray) capacities;          // [rows][width]
-  // With other ranks, else 0. A word has, in its low half, this rank's quota of supersegments in the list,
-  // and in its high half the part of the room for pre-segments that begin runs. First for the counted lists,
-  // then for all.
+  // With other ranks; otherwise 0. The low half of a word is this rank's quota of supersegments in the list;
+  // the high half is the part of the room for pre-segments that begin runs. First for the counted lists, then
+  // for all.
   VDI_ADDRESS(UintArray) countedQuotas;
   VDI_ADDRESS(UintArray) quotas;
   uint width;

@@ -296,7 +296,7 @@ void Communicator::reduceMax(std::span<std::uint64_t> values, int root) const {
        MPI_MAX, root, state_->comm());
 }
 
-// Memory is allocated under together() before each exchange, or with the communicator: a rank with too little
+// Memory is allocated under together() before each exchange, or with the communicator: a rank without enough
 // makes all fail, instead of leaving the others waiting in a call that it never makes.
 
 std::vector<std::byte> Communicator::broadcast(std::vector<std::byte> bytes, int root) const {

@@ -42,14 +42,14 @@ glm::ivec3 indexOf(const glm::dvec3& index, const Block& block) {
   return glm::ivec3(glm::clamp(index, -beyond, glm::dvec3(block.dims) + beyond));
 }
 
-/// Values of the box's points, those on its faces included, or of its cells.
+/// Indices of the box's points, including those on its faces, or of its cells.
 IndexBox valuesIn(const Box& box, const Block& block) {
   const glm::dvec3 origin = block.origin - block.offset * block.spacing;
   return {indexOf(glm::ceil((box.lo - origin) / block.spacing - indexTolerance), block),
           indexOf(glm::floor((box.hi - origin) / block.spacing + indexTolerance) + 1.0, block)};
 }
 
-/// Values for interpolation in the box and up to `reach` beyond.
+/// Indices of the values for interpolation in the box and up to `reach` beyond.
 IndexBox valuesFor(const Box& box, const Block& block) {
   const double beyond = reach - indexTolerance;
   return {indexOf(glm::floor((box.lo - block.origin) / block.spacing - beyond), block),

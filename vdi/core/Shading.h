@@ -39,7 +39,7 @@ struct Shading {
   bool operator==(const Shading&) const = default;
 };
 
-/// A difference smaller than this share of the two values counts as rounding error.
+/// A difference smaller than this share of two values counts as rounding error.
 inline constexpr double leastGradient = 1e-6;
 
 /// If shading is on, throws Error{InvalidArgument} for lights that are not valid. The table of settings

@@ -20,7 +20,7 @@ class PipelineSet {
  public:
   /// `common` is the info without the specialisation. `hasPrograms`: the shader is one of PROGRAMS in
   /// CMakeLists.txt, and the first word of a specialisation, constant 0, is the program's number. CPU devices
-  /// get the program without the others' code, which compiles several times as fast.
+  /// get the program without the others' code, because they compile it several times as fast.
   PipelineSet(std::shared_ptr<Device> device, ComputePipelineInfo common, bool hasPrograms = false);
   /// Shares the uniforms of another set, which updates them. Has programs if that set does.
   PipelineSet(const PipelineSet& updated, ComputePipelineInfo common);

@@ -45,7 +45,7 @@ class VulkanDevice {
   /// Index of the first memory type that `typeBits` allows and that has `wanted`; nullopt if there is none.
   /// By Vulkan's order it is the one with the fewest other properties.
   std::optional<std::uint32_t> findMemoryType(std::uint32_t typeBits, VkMemoryPropertyFlags wanted) const;
-  /// findMemoryType that throws Error{OutOfMemory} if there is none.
+  /// Like findMemoryType, but throws Error{OutOfMemory} if there is none.
   std::uint32_t memoryType(std::uint32_t typeBits, VkMemoryPropertyFlags wanted) const;
   /// Bits of the memory types under which the process's memory at `pages`, aligned to hostPointerAlignment,
   /// can be imported; 0: none.

@@ -20,7 +20,7 @@ class BandDownload {
   BandDownload(BandDownload&&) = delete;
   BandDownload& operator=(BandDownload&&) = delete;
 
-  /// The transfer queue copies, after the commands that write the lists and beside other work of the device.
+  /// The transfer queue copies the lists after the commands that write them, beside other work of the device.
   /// The lists are complete when this returns.
   template <typename Segment>
   ListsOf<Segment> get(const DeviceLists& band);

@@ -258,7 +258,7 @@ double ParticleRouting::sumOf(const Spread& spread, std::span<const Place* const
           std::vector<double>& along = shares[static_cast<std::size_t>(axis)];
           along.clear();
           for (int part = range.lo[axis]; part < range.hi[axis]; ++part) {
-            // The share of the part's cell that is owned; a cloud has one part a cell.
+            // The share of the part's cell that is owned; a cloud has one part per cell.
             const int cell = part / cells.parts[axis];  // rounds down: >= 0
             const double lower = place.lower[axis] + cell * place.spacing[axis];
             double share = overlap(lower, lower + place.spacing[axis], owned.lo[axis], owned.hi[axis]) /

@@ -1,5 +1,5 @@
-// Writes a .vdi file by all ranks together: each encodes and writes the chunks of its own lists. Not part of
-// the library's interface.
+// All ranks write a .vdi file together: each encodes and writes the chunks of its own lists. Not part of the
+// library's interface.
 #pragma once
 
 #include <cstddef>

@@ -41,8 +41,8 @@ glm::dvec4 cross(const ExactVolume& volume, const TransferFunction& function,
                  const std::vector<double>& isovalues, const glm::dvec3& from, const glm::dvec3& to,
                  int parts);
 
-/// The picture of the camera, row 0 at the bottom, without depths: a ray through each pixel's centre, with 64
-/// samples for each voxel that it may cross. Isosurfaces are unshaded.
+/// The picture of the camera, row 0 at the bottom, without depths: a ray through each pixel's centre, with
+/// `samplesPerVoxel` samples for each voxel that it may cross. Isosurfaces are unshaded.
 Image renderExactly(const ExactVolume& volume, const TransferFunction& function, const Camera& camera,
                     int width, int height, int samplesPerVoxel = 64, const Blending& blending = {});
 
