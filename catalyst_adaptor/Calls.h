@@ -18,7 +18,7 @@
 
 namespace vdi::catalyst {
 
-/// Of an array.
+/// The maximum number of components of an array.
 inline constexpr int maxComponents = 16;
 
 /// The part of a handle that these functions use.
@@ -29,8 +29,8 @@ struct Calls {
 };
 
 /// Collective: returns the highest code of any rank. On failure it stores the text of the lowest rank with
-/// that code and a text, on all ranks, and rank 0 prints it. `step` is given by execute. Never throws:
-/// without memory the text is a shorter one.
+/// that code and a text, on all ranks, and rank 0 prints it. Only execute gives `step`. Never throws: without
+/// memory, the text is shorter.
 int conclude(Calls& self, int code, std::string_view text, std::optional<std::int64_t> step) noexcept;
 
 /// Runs `work`, which returns nothing or the text of a failure. A failure or an exception becomes `code`.
@@ -71,8 +71,8 @@ int guardedTogether(Calls& self, int code, Work work, std::optional<std::int64_t
       step);
 }
 
-/// Collective: makes a handle on a duplicate of the communicator, which the caller frees. On failure there is
-/// neither, on any rank.
+/// Collective: makes a handle on a duplicate of the communicator, which the caller frees. On failure, no rank
+/// has either.
 template <typename Handle>
 int makeHandle(std::int32_t fortranCommunicator, std::unique_ptr<Handle>& handle) {
   Calls calls;  // reports that there is no memory for the handle
@@ -97,12 +97,12 @@ inline void require(bool good, const char* what) {
 void requireEqual(MPI_Comm comm, std::int64_t value, const char* what);
 /// Throws std::invalid_argument with the reason if the blocks are missing, or one is invalid.
 void checkBlocks(std::int32_t count, const vdi_catalyst_block* blocks);
-/// Memory for a mark of each of the block's cells, which ParaView needs where some are ghost cells; null
-/// where none is. Throws std::runtime_error if there is too little memory.
+/// Memory for a mark of each of the block's cells, which ParaView needs if some are ghost cells; null if none
+/// are. Throws std::runtime_error if there is too little memory.
 std::unique_ptr<unsigned char[]> newMarks(const vdi_catalyst_block& block);
 /// Throws std::invalid_argument with the reason if an array can't have the name, association or offset.
 void checkOffset(const char* name, std::int32_t association, const double* offset);
-/// Throws std::invalid_argument with the reason unless the time of a step is finite: files hold no other.
+/// Throws std::invalid_argument with the reason unless the time of a step is finite: files hold no others.
 void requireTime(double time);
 /// Whether ParaView can count this step.
 bool isStep(std::int64_t step);

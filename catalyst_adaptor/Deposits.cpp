@@ -46,7 +46,7 @@ void Deposits::make(Fields& fields, const std::string& name, std::int64_t step) 
   });
 }
 
-/// Tells of each kind of fault once, on rank 0.
+/// Reports each kind of fault once, on rank 0.
 void Deposits::tell(const std::string& name, const ParticleCounts& counts, std::int64_t step) {
   struct Kind {
     std::uint64_t count;
@@ -68,10 +68,11 @@ void Deposits::tell(const std::string& name, const ParticleCounts& counts, std::
   if ((now & ~told) == 0) return;
   told |= now;
   if (comm_.rank() != 0) return;
-  std::fprintf(stderr,
-               "vdi_catalyst: step %lld: of the %llu particles of '%s', %s; more such steps aren't told\n",
-               static_cast<long long>(step), static_cast<unsigned long long>(counts.given), name.c_str(),
-               text.c_str());
+  std::fprintf(
+      stderr,
+      "vdi_catalyst: step %lld: of the %llu particles of '%s', %s; further such steps aren't reported\n",
+      static_cast<long long>(step), static_cast<unsigned long long>(counts.given), name.c_str(),
+      text.c_str());
 }
 
 DeviceDeposits::DeviceDeposits(int fortranCommunicator)

@@ -27,10 +27,9 @@ class Deposits {
       : comm_(comm), depositor_(device, comm) {}
 
   /// Collective: makes the array of the particles of that name, which `fields` has, and keeps it there.
-  /// Throws on all ranks, as ParticleDepositor does. `step` is told with the numbers of particles that are
-  /// left out.
+  /// Throws on all ranks, as ParticleDepositor does. The report of particles that are left out names `step`.
   void make(Fields& fields, const std::string& name, std::int64_t step);
-  /// Takes over what another object has told already.
+  /// Takes over the record of the faults that another object has reported.
   void continueTelling(const Deposits& other) { told_ = other.told_; }
 
  private:
@@ -40,10 +39,10 @@ class Deposits {
   const comm::Communicator& comm_;
   ParticleDepositor depositor_;
   std::optional<std::uint64_t> version_;
-  std::map<std::string, unsigned> told_;  // by name: a bit for each kind of particles told of
+  std::map<std::string, unsigned> told_;  // by name: a bit for each reported kind of fault
 };
 
-/// Deposits on a device of their own, which the first one opens.
+/// Deposits particles on a device of its own, which the first deposit opens.
 class DeviceDeposits {
  public:
   /// Collective: duplicates the communicator.

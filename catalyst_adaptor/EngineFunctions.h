@@ -10,16 +10,17 @@
 extern "C" {
 #endif
 
-/* One entry for each function of vdi_catalyst.h, with the same contract. An engine of scripts has the first
- * two, one of JSON runs the next two, the isolated one the first three. All these get a valid communicator,
- * and a null *catalyst. In the isolated engine they return VDI_CATALYST_NOT_ISOLATED, on all ranks, for a run
- * that another engine has to carry out in this process.
+/* One entry for each function of vdi_catalyst.h, with the same contract. Of the first four entries, the
+ * engine for scripts has the first two, the engine for JSON runs the last two, and the isolated engine the
+ * first three. These entries get a valid communicator, and a null *catalyst. In the isolated engine they
+ * return VDI_CATALYST_NOT_ISOLATED, on all ranks, for a run that another engine has to carry out in this
+ * process.
  *
  * `make_frames_of_json` is initialize_json in the processes that make an isolated run's frames. If `goes_on`,
- * earlier processes have made a part of the run, whose files stay.
- * `set_clock`, which may be null, sets the time in seconds, since the run's start, that counts as that of the
- * next step. `log_left_out`, which may be null, notes in the log, on the first rank, that the simulation
- * didn't hand over a step, because two earlier frames were still to be made. Both aren't collective. */
+ * earlier processes have made a part of the run, whose files stay. `set_clock`, which may be null, sets the
+ * time, in seconds since the run's start, that counts for the next step. `log_left_out`, which may be null,
+ * notes in the log, on the first rank, that the simulation didn't hand over a step, because two earlier
+ * frames were still to be made. Neither is collective. */
 typedef struct vdi_catalyst_functions {
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**);
   int (*initialize_pipelines)(int32_t, int32_t, const vdi_catalyst_pipeline*, vdi_catalyst**);
@@ -48,8 +49,8 @@ enum { VDI_CATALYST_NOT_ISOLATED = -1 };
 VDI_CATALYST_API extern const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS;
 
 /* libvdi_catalyst.so exports these for the program in which the isolated engine makes frames
- * (isolated/process). They call the entries of these names of the engine for JSON, and the last two do
- * nothing for other runs. */
+ * (isolated/process). They call the JSON engine's entries of the same names, and the last two do nothing for
+ * other runs. */
 VDI_CATALYST_API int vdi_catalyst_make_frames_of_json(int32_t fortran_communicator, const char* json,
                                                       int goes_on, vdi_catalyst** catalyst);
 VDI_CATALYST_API void vdi_catalyst_set_clock(vdi_catalyst* catalyst, double seconds);

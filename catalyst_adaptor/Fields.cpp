@@ -256,7 +256,7 @@ std::vector<Block> Fields::blocksOf(const std::string& name, bool cells, int com
     const StridedValues& values = all.blocks[i];
     if (values.first == nullptr) continue;
     Block& block = blocks.emplace_back(blockAt(blocks_[i], cells, offset, values.first));
-    // An array without components has but one value to choose.
+    // An array of one component has only that one to show.
     showComponent(block, arrayOf(values, all.type), values.components > 1 ? component : magnitude);
   }
   return blocks;

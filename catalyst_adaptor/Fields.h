@@ -41,7 +41,7 @@ class Fields {
   /// An array's values, one entry for each block, with the same number of components. Blocks that lack the
   /// array have a null `first`. An array of cells replaces particles of that name.
   static Change arrayChange(const std::string& name, bool cells, int type, std::vector<StridedValues> values);
-  /// Lets the values of that array lie `offset` cells beside the points or the middles of cells.
+  /// Shifts the values of that array by `offset` cells from the points or the centres of cells.
   static Change offsetChange(const std::string& name, bool cells, const std::array<double, 3>& offset);
   /// The particles of which an array of cells is to be made. It replaces such an array of that name.
   static Change particlesChange(const std::string& name, const ParticleArray& particles);
@@ -76,7 +76,7 @@ class Fields {
   /// The offset of an array's values, in cells. It may be given before the array.
   glm::dvec3 offsetOf(const std::string& name, bool cells) const;
 
-  int componentsOf(const std::string& name, bool cells) const;  // 1 without blocks that have it
+  int componentsOf(const std::string& name, bool cells) const;  // 1 if no block has the array
   /// An array's values where the simulation has them, one for each block; null where a block lacks them.
   /// Empty if this rank lacks the array.
   struct Values {
@@ -97,7 +97,7 @@ class Fields {
   struct Array {
     int type = VDI_CATALYST_F64;
     std::vector<StridedValues> values;
-    std::uint64_t set = 0;  // the number of the change by which an array of that name came
+    std::uint64_t set = 0;  // the number of the change that first set an array of that name
   };
   using Key = std::pair<bool, std::string>;  // whether it is one of cells, and the name
   const Array* find(const std::string& name, bool cells) const;

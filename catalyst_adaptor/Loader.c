@@ -30,7 +30,7 @@ static vdi_engine script_engine = {
 static vdi_engine json_engine = {VDI_CATALYST_JSON_FILE, "the Vulkan loader (Debian: libvulkan1)", NULL};
 static vdi_engine isolated_engine = {VDI_CATALYST_ISOLATED_FILE, "no other package", NULL};
 
-/* The engine that a run has; null: none so far. */
+/* The engines of the two kinds of runs; null before the first run. */
 static vdi_engine* script_run;
 static vdi_engine* json_run;
 /* The JSON run's handle until it is finalized. All other handles belong to the run of scripts, whose engine
@@ -106,7 +106,7 @@ static int prepare(vdi_engine* wanted, MPI_Comm comm) {
   return failed_anywhere(comm, failed, message) || failed ? VDI_CATALYST_ENGINE : VDI_CATALYST_OK;
 }
 
-/* Collective: whether the first rank's environment says something about isolation. */
+/* Collective: returns whether the first rank's environment sets VDI_ISOLATION. */
 static int names_isolation(MPI_Comm comm) {
   const char* value = getenv("VDI_ISOLATION");
   int names = value != NULL && *value != '\0';
@@ -120,7 +120,8 @@ typedef struct vdi_given {
   const vdi_catalyst_pipeline* pipelines;
   int32_t count;
   const char* json;
-  int kind; /* 0: scripts, 1: pipelines, 2: JSON, 3: JSON whose frames are made here; count: if it goes on */
+  int kind; /* 0: scripts, 1: pipelines, 2: JSON, 3: JSON whose frames are made here, with `count` as goes_on
+             */
 } vdi_given;
 
 static int initialize_with(const vdi_engine* engine, int32_t communicator, const vdi_given* given,
@@ -137,7 +138,7 @@ static int initialize_with(const vdi_engine* engine, int32_t communicator, const
   }
 }
 
-/* Asks the isolated engine first, where it may have to do it. */
+/* Asks the isolated engine first if it may have to carry out the run. */
 static int initialize_some(int32_t communicator, const vdi_given* given, vdi_engine** run,
                            vdi_catalyst** catalyst) {
   const MPI_Comm comm = communicator_of(communicator);
@@ -145,7 +146,8 @@ static int initialize_some(int32_t communicator, const vdi_given* given, vdi_eng
     fprintf(stderr, "vdi_catalyst: there is no MPI, or no communicator has this Fortran handle\n");
     return VDI_CATALYST_BAD_ARGUMENT;
   }
-  /* The text of a run tells, too, which only that engine reads. A run that goes on refuses another one. */
+  /* A JSON text may ask for isolation, too, and the isolated engine reads it. The engine of a JSON run under
+   * way refuses another one. */
   const int goes_on = run == &json_run && json_handle != NULL;
   vdi_engine* const own = run == &json_run ? &json_engine : &script_engine;
   const int isolated =
@@ -318,7 +320,7 @@ int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, const char* name, int
 }
 
 int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
-  if (catalyst != NULL && is_forked()) return VDI_CATALYST_OK; /* it ends in the process that began it */
+  if (catalyst != NULL && is_forked()) return VDI_CATALYST_OK; /* the run ends in the process that began it */
   int over = 0;
   MPI_Finalized(&over);
   if (over && catalyst != NULL && (script_run != NULL || json_run != NULL))

@@ -22,9 +22,9 @@ class Parameters {
  public:
   /// The declared parameter of that name; null if there is none.
   const Parameter* find(const std::string& name) const;
-  /// Throws std::invalid_argument if the parameter can't be declared, or not so again: because of its name,
-  /// bounds or type, or because there are too many. A declared one's bounds don't matter. `declare` can't
-  /// fail afterwards.
+  /// Throws std::invalid_argument if the parameter can't be declared because of its name or bounds, or
+  /// because there are too many, or if it was declared with another type. The bounds of a declared parameter
+  /// don't matter. Afterwards, `declare` can't fail.
   void prepare(const Parameter& parameter);
   /// Throws std::invalid_argument if the value is outside the bounds.
   static void checkValue(const Parameter& parameter);

@@ -52,7 +52,7 @@ static char* find(char* const* variables, const char* name, size_t length) {
   return NULL;
 }
 
-/* "NAME=value" sets a variable, "NAME" removes it. Leaves a variable alone that has the value already,
+/* "NAME=value" sets a variable, "NAME" removes it. Leaves a variable alone if it has the value already,
  * because other threads may be reading the environment. */
 static void apply(const char* variable) {
   const size_t length = name_length(variable);
@@ -118,8 +118,7 @@ static void restore_environment(char** before) {
   free_all(before);
 }
 
-/* Reads the umask. Doesn't change it for that if the system can tell it, because another thread may be making
- * a file. */
+/* Reads the umask, if possible without changing it, because another thread may be creating a file. */
 static mode_t current_umask(void) {
   char line[256];
   unsigned int mask = 0;
@@ -141,7 +140,7 @@ static void save_signals(vdi_process_state* state) {
   }
   pthread_sigmask(SIG_SETMASK, NULL, &state->blocked);
   if (sigaltstack(NULL, &state->signal_stack) != 0) state->signal_stack.ss_flags = SS_ONSTACK;
-  /* A closed pipe and a file beyond the limit of sizes are then errors of the write. */
+  /* A write to a closed pipe or beyond the file size limit then returns an error. */
   if (state->actions[SIGPIPE].sa_handler == SIG_DFL) signal(SIGPIPE, SIG_IGN);
   if (state->actions[SIGXFSZ].sa_handler == SIG_DFL) signal(SIGXFSZ, SIG_IGN);
 }

@@ -9,7 +9,7 @@
 
 namespace vdi::catalyst {
 
-/// A Python file, and what get_args() of paraview.catalyst returns in it.
+/// A Python file, and the arguments that paraview.catalyst.get_args() returns in it.
 struct Script {
   std::string file;
   std::vector<std::string> arguments;

@@ -15,7 +15,7 @@ namespace vdi::catalyst {
 
 namespace {
 
-/// Whether a row has no gaps, nor the components of its values.
+/// Whether neither a row nor the components of its values have gaps.
 bool rowInOrder(const StridedValues& values) {
   const auto scalar = static_cast<std::int64_t>(values.scalarBytes);
   return (values.components == 1 || values.componentStride == scalar) &&

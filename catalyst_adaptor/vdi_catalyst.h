@@ -15,13 +15,13 @@
  *     vdi_catalyst_finalize(catalyst);                              before MPI_Finalize
  *
  * All functions but vdi_catalyst_error are collective over the communicator: each rank makes all calls in the
- * same order, also a rank without blocks (count 0, null pointers). None ends the process. They return
+ * same order, even a rank without blocks (count 0, null pointers). None ends the process. They return
  * VDI_CATALYST_OK or a code below, the same one on all ranks, and rank 0 prints a message to standard error.
- * It prints a repeated message in full once. A step that fails again gets one line, because its files are
- * missing. After an error, the next step works again, with the blocks and arrays from before. Values are used
- * where they are: pointers must stay valid, and their data unchanged, until vdi_catalyst_execute returns. The
- * host holds copies of only the layers beside blocks, and of whole blocks if the blocks' scalar types differ.
- * Arrays made of particles take 4 bytes a cell.
+ * Rank 0 prints a repeated message in full only once. A step that fails again gets one line, because its
+ * files are missing. After an error, the next step works again, with the blocks and arrays from before.
+ * Values are used where they are: pointers must stay valid, and their data unchanged, until
+ * vdi_catalyst_execute returns. The host holds copies of only the layers beside blocks, and of whole blocks
+ * if the blocks' scalar types differ. Arrays made of particles take 4 bytes a cell.
  *
  * Scripts are Catalyst scripts of version 2 (paraview.catalyst). They find the blocks, a
  * vtkPartitionedDataSet with one vtkImageData per block, under the name "grid":
@@ -34,8 +34,8 @@
  * the calling thread's signal mask and floating-point environment (traps, rounding, flags), the locale, the
  * environment variables, the working directory, the umask and the soft limits of resources. At the next step,
  * scripts find the variables again that they have set. During a call, a signal finds the simulation's
- * handler, unless a script sets another one. SIGPIPE and SIGXFSZ, which comes with a limit of file sizes, are
- * ignored if they would end the process.
+ * handler, unless a script sets another one. SIGPIPE and SIGXFSZ, which a file beyond the size limit raises,
+ * are ignored if they would end the process.
  *
  * These events still end the process, because ParaView, Python or a library gives no choice: a script that
  * calls os._exit or os.abort, or crashes in one of its modules; an allocation of ParaView's own that fails
@@ -43,11 +43,12 @@
  * without a display by methods of its render window or SMProxy instead of paraview.simple; a crash of a
  * driver.
  *
- * None of them does if frames are made in processes of their own: by "isolation" in a JSON text, or by
- * VDI_ISOLATION=process in the first rank's environment. Then vdi_catalyst_execute copies the values of a
- * wanted step, which the simulation may change when the call returns, and the frame is made meanwhile. The
- * code of a frame that fails is returned by a later call, the same one on all ranks. If a process dies, all
- * calls return VDI_CATALYST_ENGINE from then on, or processes start again (docs/catalyst-guide.md). */
+ * None of these events ends the process if frames are made in processes of their own: by "isolation" in a
+ * JSON text, or by VDI_ISOLATION=process in the first rank's environment. Then vdi_catalyst_execute copies
+ * the values of a wanted step, which the simulation may change when the call returns, and the frame is made
+ * meanwhile. The code of a frame that fails is returned by a later call, the same one on all ranks. If a
+ * process dies, all calls return VDI_CATALYST_ENGINE from then on, or processes start again
+ * (docs/catalyst-guide.md). */
 #ifndef VDI_CATALYST_H
 #define VDI_CATALYST_H
 
@@ -157,15 +158,15 @@ VDI_CATALYST_API int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t cou
                                              const vdi_catalyst_block* blocks);
 
 /* Sets the values of one named array: data[i] belongs to block i, and is null if the block lacks the array.
- * Such a block is no part of a picture of the array. An array that all blocks of all ranks lack is an error
- * once it is to be shown. Another call with the same name replaces the pointers. */
+ * Pictures of the array leave out such a block. An array that all blocks of all ranks lack is an error once
+ * it is to be shown. Another call with the same name replaces the pointers. */
 VDI_CATALYST_API int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type,
                                             int32_t association, const void* const* data);
 
 /* The layout of the values of one block, in bytes: component c of value (x, y, z) lies at the block's pointer
  * + x * strides[0] + y * strides[1] + z * strides[2] + c * component_stride. So the pointer is to the block's
- * first value, wherever in an allocation that is: layers before it, and padding, are never read. Strides may
- * be 0 or negative, and need not be multiples of the scalar's size. */
+ * first value, wherever in an allocation that lies: layers before it, and padding, are never read. Strides
+ * may be 0 or negative, and need not be multiples of the scalar's size. */
 typedef struct vdi_catalyst_strides {
   int64_t strides[3];
   int64_t component_stride; /* unused for one component */
@@ -186,12 +187,13 @@ VDI_CATALYST_API int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, cons
                                                     const void* const* data,
                                                     const vdi_catalyst_strides* strides);
 
-/* Lets the values of an array lie beside the points or the middles of cells, by offset[axis] cells along each
- * axis, from -0.5 to 0.5: those of staggered grids. The offset is the same on all ranks. For example, values
- * of cells with the offset {-0.5, 0, 0} lie on the lower x faces of their cells. Blocks stay where they are;
- * beyond a block's values, its neighbours' count, and at the domain's end the last ones go on. An offset goes
- * with the association and the name, may come before its array, and is forgotten by vdi_catalyst_set_blocks.
- * In scripts, VolumetricDepthImage follows it, and ParaView's own filters don't know it. */
+/* Shifts the values of an array from the points or the centres of cells by offset[axis] cells along each
+ * axis, from -0.5 to 0.5, as on staggered grids. The offset is the same on all ranks. For example, values of
+ * cells with the offset {-0.5, 0, 0} lie on the lower x faces of their cells. Blocks stay where they are;
+ * beyond a block's values, its neighbours' values count; at the domain's end, the last values continue. An
+ * offset goes with the association and the name, may come before its array, and is forgotten by
+ * vdi_catalyst_set_blocks. In scripts, VolumetricDepthImage follows it, and ParaView's own filters don't know
+ * it. */
 VDI_CATALYST_API int vdi_catalyst_set_array_offset(vdi_catalyst* catalyst, const char* name,
                                                    int32_t association, const double offset[3]);
 
@@ -221,20 +223,20 @@ typedef struct vdi_catalyst_particles {
   int32_t length_type;
 } vdi_catalyst_particles;
 
-/* Makes an array of cells, of type VDI_CATALYST_F32, of particles. Scripts, runs without one and their
- * conditions find it under `name`, which is the same on all ranks, as they find other arrays. It is made anew
- * in each vdi_catalyst_execute that needs it, of the particles as they are then. So pointers must stay valid
- * until that returns, but need no call at each step. set_array for cells of the same name replaces the
- * particles, as these replace such an array, and vdi_catalyst_set_blocks forgets them.
+/* Makes an array of cells from particles, of type VDI_CATALYST_F32. Scripts, runs without one and their
+ * conditions find it under `name`, which is the same on all ranks, as they find other arrays. Each
+ * vdi_catalyst_execute that needs the array makes it anew, from the particles as they are then. So pointers
+ * must stay valid until that call returns, but no call is needed at each step. set_array for cells of the
+ * same name replaces the particles, as these replace such an array, and vdi_catalyst_set_blocks forgets them.
  *
  * Particles may lie in blocks of any rank. The spacing of the block that owns the position, which is the
  * finest one there, decides how far a particle's weight spreads:
  *
- * - Without smoothing length, cloud in cell: the weight fills a box of the spacing's size around the
- *   position. Each cell gets the share of the box that lies in it.
- * - With a smoothing length h, the cubic spline M4 with support 2 h in three dimensions (Monaghan 1992),
- * taken at the centres of cells. If h is below 0.75 of the spacing's largest component, cloud in cell: there
- * both spread equally wide, and a shorter kernel could miss all centres.
+ * - Without a smoothing length, cloud in cell applies: the weight fills a box of the spacing's size around
+ *   the position. Each cell gets the share of the box that lies in it.
+ * - With a smoothing length h, the cubic spline M4 with support 2 h in three dimensions (Monaghan 1992)
+ *   applies, at the centres of cells. If h is below 0.75 of the spacing's largest component, cloud in cell
+ *   applies: at that length both spread equally wide, and a shorter kernel could miss all centres.
  *
  * No weight is lost: the shares of each particle are divided by their sum over all cells that blocks own.
  * Near a face of the domain, the weight that would lie beyond it thus goes to the cells on this side. Ghost
@@ -243,8 +245,8 @@ typedef struct vdi_catalyst_particles {
  *
  * Particles outside all blocks (blocks own their lower faces, not their upper ones), and those whose position
  * or weight isn't finite, are left out. Those whose h is NaN, infinite, 0 or negative are deposited by cloud
- * in cell. Rank 0 prints a line with their numbers the first time that there are such particles of a name.
- * Values beyond the range of f32 make vdi_catalyst_execute fail with VDI_CATALYST_SCRIPT.
+ * in cell. Rank 0 prints a line with their numbers the first time that an array has such particles. Values
+ * beyond the range of f32 make vdi_catalyst_execute fail with VDI_CATALYST_SCRIPT.
  *
  * This returns VDI_CATALYST_BAD_ARGUMENT for a negative count, null positions, unknown types, strides that
  * lead beyond the address space, and names or kinds that differ between ranks. With scripts, the first
@@ -252,14 +254,14 @@ typedef struct vdi_catalyst_particles {
 VDI_CATALYST_API int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const char* name,
                                                 const vdi_catalyst_particles* particles);
 
-/* Whether a script will do anything at this step: 1 if it will or that can't be known, 0 if not; the same on
- * all ranks. After 0, the simulation need neither prepare its values nor call vdi_catalyst_execute. It is 1
- * if a script isn't loaded yet, as before the first step; if a script defines catalyst_execute, which runs at
- * each step; and if the trigger of an extractor is due. In a run without a script it is 1 if a frame is due
- * by step, time or clock, whether or not the data and the share of wall time will permit it, and at each step
- * if viewers may steer. Where scripts run in a process of their own, it is 1, too, while that process is at
- * work and hasn't answered yet. It is 0 for a null or finalized handle and for a step that
- * vdi_catalyst_execute refuses. */
+/* Returns whether a script will do anything at this step: 1 if it will or if that is unknown, 0 if not; the
+ * same on all ranks. After 0, the simulation need neither prepare its values nor call vdi_catalyst_execute.
+ * The result is 1 if a script isn't loaded yet, as before the first step; if a script defines
+ * catalyst_execute, which runs at each step; and if the trigger of an extractor is due. In a run without a
+ * script it is 1 if a frame is due by step, time or clock, whether or not the data and the share of wall time
+ * will permit it, and at each step if viewers may steer. Where scripts run in a process of their own, it is
+ * 1, too, while that process is at work and hasn't answered yet. It is 0 for a null or finalized handle and
+ * for a step that vdi_catalyst_execute refuses. */
 VDI_CATALYST_API int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time);
 
 /* Runs the scripts on the blocks as they are now. `step` is the same on all ranks, from 0 to INT32_MAX,
@@ -283,9 +285,10 @@ VDI_CATALYST_API int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, cons
                                                     int64_t low, int64_t high);
 
 /* Ends the scripts and the engine, and frees `catalyst`. A second call only returns
- * VDI_CATALYST_BAD_ARGUMENT. After MPI_Finalize this and all other functions do so, too, and this one prints
- * a message. In a process that the simulation forks, this one does nothing and returns 0, and the others
- * return VDI_CATALYST_BAD_ARGUMENT: a run belongs to the process that began it. */
+ * VDI_CATALYST_BAD_ARGUMENT. After MPI_Finalize, all functions that return a code return this one, and
+ * vdi_catalyst_finalize prints a message. In a process that the simulation forks, vdi_catalyst_finalize does
+ * nothing and returns 0, and the other functions with a code return VDI_CATALYST_BAD_ARGUMENT: a run belongs
+ * to the process that began it. */
 VDI_CATALYST_API int vdi_catalyst_finalize(vdi_catalyst* catalyst);
 
 /* The text of the last error on this rank; "" if there was none, or if a parameter was asked for since then.

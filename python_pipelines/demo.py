@@ -1,5 +1,5 @@
 """The demo's Catalyst script. At each step it makes a VDI of V, and pictures of it from the VDI's
-viewpoint and from 5, 20 and 50 degrees beside it. It renders the volume from the same viewpoints and
+viewpoint and from 5, 20 and 50 degrees away from it. It renders the volume from the same viewpoints and
 compares each pair of pictures by SSIM.
 
 Environment: VDI_PLUGIN (the plugin, which the adaptor sets), VDI_OUTPUT (the folder), VDI_WIDTH and

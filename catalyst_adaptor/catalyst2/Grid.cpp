@@ -32,13 +32,13 @@ Node onlyTopology(const Node& domain) {
   return all.front();
 }
 
-/// `otherwise` where there's no such path.
+/// The number at that path; `otherwise` if there is none.
 double numberOr(double otherwise, const Node& node, const std::string& path) {
   const std::optional<Node> found = node.find(path);
   return found ? found->number() : otherwise;
 }
 
-/// Without ghost layers.
+/// The domain's block, without ghost layers.
 vdi_catalyst_block blockOf(const Node& domain, const Node& topology) {
   requireUniform(topology.at("type"));
   const Node coordset = domain.at("coordsets/" + topology.at("coordset").text());
@@ -71,13 +71,14 @@ Counts countsOf(const vdi_catalyst_block& block, std::int32_t association) {
           std::int64_t{block.cells[2]} + more};
 }
 
-/// Which of a field's elements belong to a block: that of value (x, y, z) is first + x * strides[0] + ...
+/// The field's elements that belong to a block: value (x, y, z) is element first + x * strides[0] + ...
 struct Elements {
   std::int64_t first = 0;
   Counts strides{};
 };
 
-/// A field may say `offsets` and `strides` of its elements per axis, as in a halo. `count`: of all elements.
+/// A field may give `offsets` and `strides` of its elements per axis, as in a halo. `count` elements exist in
+/// all.
 Elements elementsOf(const Node& field, const Counts& counts, std::int64_t count) {
   Elements elements{0, {1, counts[0], counts[0] * counts[1]}};
   const std::optional<Node> offsets = field.find("offsets");
@@ -124,7 +125,7 @@ bool isGhostField(const std::string& name) {
   return std::ranges::find(ghostFields, name) != ghostFields.end();
 }
 
-/// The cells that are no ghosts: their number, and the box around them.
+/// The cells that aren't ghosts: their number, and the box around them.
 struct Inside {
   std::int64_t count = 0;
   Counts low{std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::max(),
@@ -162,7 +163,7 @@ Inside insideOf(const Node& field, const vdi_catalyst_block& block) {
   return inside;
 }
 
-/// Announces the layers that a field marks as ghosts. False if all cells are.
+/// Announces the layers that a field marks as ghosts. Returns false if all cells are ghosts.
 bool addGhosts(const Node& domain, vdi_catalyst_block& block) {
   for (const char* name : ghostFields) {
     const std::optional<Node> field = domain.find(std::string("fields/") + name);
@@ -276,7 +277,7 @@ void Grid::addField(const Node& field, const vdi_catalyst_block& block) {
   if (!association) field.refuse("has no association 'vertex' or 'element'");
   const Node values = field.at("values");
   const std::vector<Leaf> components = componentsOf(values);
-  // An array that vdi_catalyst.h doesn't take costs no others their frames.
+  // vdi_catalyst.h doesn't take such an array. Frames of other arrays go on.
   if (components.size() > maxComponents) return leaveOut(field.name());
   const Leaf& leaf = components.front();
   const Elements elements = elementsOf(field, countsOf(block, *association), leaf.count);

@@ -14,7 +14,7 @@
 
 namespace vdi::catalyst {
 
-/// This rank's blocks and arrays. The values stay where the simulation has them, but for vectors whose
+/// This rank's blocks and arrays. The values stay where the simulation has them, except for vectors whose
 /// components lie at uneven distances: these are copied side by side.
 class Grid {
  public:
@@ -27,9 +27,9 @@ class Grid {
     std::vector<vdi_catalyst_strides> strides;  // one for each block
   };
 
-  /// Takes the place of what was there before. `data`: a domain, or any number of them, in lists or objects;
-  /// nothing: no blocks. Returns whether blocks, arrays and the places of all values are those of before.
-  /// Throws std::invalid_argument for what isn't a uniform grid in three dimensions.
+  /// Replaces blocks and arrays by those of `data`: a domain, or any number of domains in lists or objects.
+  /// Without data there are no blocks. Returns whether blocks, arrays and the places of all values are as
+  /// before. Throws std::invalid_argument unless all domains are uniform grids in three dimensions.
   bool read(const std::optional<Node>& data);
 
   const std::vector<vdi_catalyst_block>& blocks() const { return blocks_; }
@@ -49,7 +49,7 @@ class Grid {
   std::vector<vdi_catalyst_block> blocks_;
   std::map<Key, Array> arrays_;
   std::vector<std::string> leftOut_;
-  /// Kept from step to step, so that values that are copied lie where they lay before.
+  /// Copies of values, kept from step to step so that their addresses stay the same.
   std::vector<std::vector<std::byte>> copies_;
   std::size_t copiesUsed_ = 0;
 };

@@ -24,8 +24,8 @@ std::unique_ptr<Session>& session() {
   return one;
 }
 
-/// 100 for what can't be taken, as ParaView's implementation; 102 and 103 for VDI_CATALYST_ENGINE and
-/// _SCRIPT. Catalyst's own codes are lower.
+/// 100 for invalid input, as in ParaView's implementation; 102 and 103 for VDI_CATALYST_ENGINE and _SCRIPT.
+/// Catalyst's own codes are lower.
 catalyst_status statusOf(int code) {
   if (code == VDI_CATALYST_OK) return catalyst_status_ok;
   constexpr int first = 100;
@@ -46,7 +46,7 @@ catalyst_status run(const conduit_node* params, Work work) {
   return statusOf(VDI_CATALYST_BAD_ARGUMENT);
 }
 
-/// As ParaView's implementation takes it: a Fortran handle, or all ranks of the simulation.
+/// The communicator, as ParaView's implementation takes it: a Fortran handle, or all ranks of the simulation.
 MPI_Comm communicatorOf(const Node& params) {
   int running = 0;
   int over = 0;
@@ -74,7 +74,7 @@ catalyst_status catalyst_initialize_vdi(const conduit_node* params) {
 }
 
 catalyst_status catalyst_execute_vdi(const conduit_node* params) {
-  // catalyst_initialize has told why there's none.
+  // catalyst_initialize has reported why there is no session.
   if (!session()) return statusOf(VDI_CATALYST_BAD_ARGUMENT);
   return run(params, [](const Node& node) { return session()->execute(node); });
 }

@@ -90,7 +90,7 @@ std::int64_t Leaf::wholeAt(std::int64_t index) const {
   return readAt<std::int64_t>(type, first + index * stride);
 }
 
-// Conduit's functions that only read take pointers to what isn't const, too.
+// Conduit's functions take pointers to non-const nodes even if they only read.
 Node::Node(const conduit_node* node, std::string path)
     : node_(const_cast<conduit_node*>(node)), path_(std::move(path)) {}
 

@@ -25,8 +25,8 @@ struct Leaf {
   std::int64_t wholeAt(std::int64_t index) const;
 };
 
-/// A node of Conduit's, which must outlive this. All but has and find throw std::invalid_argument, with the
-/// node's path, where the node isn't what is asked for.
+/// A Conduit node, which must outlive this object. All functions except has and find throw
+/// std::invalid_argument, with the node's path, if the node isn't of the requested kind.
 class Node {
  public:
   Node(const conduit_node* node, std::string path);
@@ -34,7 +34,7 @@ class Node {
   bool has(const std::string& path) const;
   std::optional<Node> find(const std::string& path) const;
   Node at(const std::string& path) const;
-  /// None where it's a leaf or empty.
+  /// The children; none if the node is a leaf or empty.
   std::vector<Node> children() const;
 
   const std::string& path() const { return path_; }

@@ -16,7 +16,7 @@ namespace vdi::catalyst {
 struct Offers {
   /// The arrays that all ranks with blocks have, each with the type that one of them gives it.
   std::map<Grid::Key, std::int32_t> common;
-  /// The names of the others, of any rank.
+  /// The names of all other arrays of any rank.
   std::set<std::string> leftOut;
 };
 

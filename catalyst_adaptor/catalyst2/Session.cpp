@@ -169,10 +169,10 @@ int Session::execute(const Node& params) {
     code = guarded(calls_, VDI_CATALYST_BAD_ARGUMENT,
                    [&] { requireEqual(calls_.comm, step, "the ranks give different steps"); });
   }
-  // Where no step can have this number, vdi_catalyst_execute says so.
+  // vdi_catalyst_execute reports a number that no step can have.
   bool isWanted = true;
   if (code == VDI_CATALYST_OK && isStep(step)) isWanted = vdi_catalyst_wants(catalyst_, step, time) != 0;
-  // An engine that is lost wants nothing. Whether it still is lost, vdi_catalyst_execute tells.
+  // A lost engine wants no step. Only vdi_catalyst_execute tells whether it is still lost.
   if (!isWanted && !hasLostEngine_) return code;
   if (code == VDI_CATALYST_OK) code = handOver(step, params);
   if (code == VDI_CATALYST_OK) {
@@ -189,7 +189,7 @@ int Session::execute(const Node& params) {
 }
 
 int Session::handOver(std::int64_t step, const Node& params) {
-  std::array<int, 2> all{0, 0};  // on all ranks: the grid is that of before; there's no channel
+  std::array<int, 2> all{0, 0};  // on all ranks: the grid is as before; there is no channel
   int code = guarded(
       calls_, VDI_CATALYST_BAD_ARGUMENT,
       [&] {

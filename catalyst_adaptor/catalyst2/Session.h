@@ -1,4 +1,4 @@
-// One use of Catalyst, from initialize to finalize: what the simulation hands over goes to vdi_catalyst.h.
+// One use of Catalyst, from initialize to finalize. It passes the simulation's data on to vdi_catalyst.h.
 #pragma once
 
 #include <cstdint>
@@ -28,8 +28,8 @@ struct Settings {
   std::vector<Parameter> parameters;
 };
 
-/// All calls are collective and return a code of vdi_catalyst.h, the same on all ranks. Rank 0 has told the
-/// reason then.
+/// All calls are collective and return a code of vdi_catalyst.h, the same on all ranks. Rank 0 has reported
+/// the reason of an error.
 class Session {
  public:
   explicit Session(MPI_Comm comm);
@@ -56,10 +56,10 @@ class Session {
   Settings settings_;
   vdi_catalyst* catalyst_ = nullptr;
   Grid grid_;
-  bool handedOver_ = false;        // the grid as it is, on all ranks
-  bool hasLostEngine_ = false;     // as the last vdi_catalyst_execute has told
-  std::set<std::string> leftOut_;  // that were told
-  std::int64_t made_ = 0;          // steps
+  bool handedOver_ = false;        // whether all ranks have handed over the current grid
+  bool hasLostEngine_ = false;     // whether the last vdi_catalyst_execute returned so
+  std::set<std::string> leftOut_;  // reported fields
+  std::int64_t made_ = 0;          // number of steps
   std::int64_t failed_ = 0;
 };
 

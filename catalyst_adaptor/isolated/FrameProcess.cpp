@@ -24,15 +24,15 @@ FrameProcess::~FrameProcess() {
   kill();
 }
 
-/// Kills the supervisor, with which the worker dies. It is alive, and so has its number, unless it has closed
-/// the socket.
+/// Kills the supervisor, with which the worker dies. Unless the supervisor has closed the socket, it is alive
+/// and its process number is valid.
 void FrameProcess::kill() {
   const pid_t supervisor = socket_.peer();
   if (supervisor > 0 && !isGone_) ::kill(supervisor, SIGKILL);
   socket_.close();
 }
 
-/// Does what needs memory, or counts the process as gone.
+/// Runs `work`. If memory runs out, counts the process as gone.
 template <typename Work>
 void FrameProcess::orGiveUp(Work work) noexcept {
   try {
@@ -42,7 +42,8 @@ void FrameProcess::orGiveUp(Work work) noexcept {
   }
 }
 
-/// Sends what `fill` puts into a message. If that fails, hears the cause, and counts the process as gone.
+/// Sends what `fill` puts into a message. If that fails, takes the messages with the cause, and counts the
+/// process as gone.
 template <typename Fill>
 void FrameProcess::tell(Fill fill, std::span<const int> descriptors) noexcept {
   bool isSent = false;
@@ -173,7 +174,7 @@ void FrameProcess::reserve(const StepWriter& data) {
   const auto next = static_cast<std::size_t>(handedOver_ % 2);
   SharedPages& buffer = buffers_[next];
   if (buffer.bytes().size() >= data.bytes()) return;
-  buffer = SharedPages();  // first, because two might find no room
+  buffer = SharedPages();  // first, because there may be no room for both
   areKnown_[next] = false;
   buffer = SharedPages(data.bytes());
 }

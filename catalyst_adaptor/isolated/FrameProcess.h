@@ -26,14 +26,15 @@ class FrameProcess {
  public:
   using Milliseconds = std::chrono::milliseconds;
 
-  /// Expects the process under a socket's name. It gets `setup` when it comes. Throws std::runtime_error.
+  /// Listens for the process under a socket's name. The process gets `setup` when it connects. Throws
+  /// std::runtime_error.
   FrameProcess(const std::string& name, const Setup& setup);
   /// Kills the process if it still runs.
   ~FrameProcess();
   FrameProcess(const FrameProcess&) = delete;
   FrameProcess& operator=(const FrameProcess&) = delete;
 
-  /// Takes what the process has said. Waits for the first message no longer than `patience`.
+  /// Takes the process's messages. Waits for the first message no longer than `patience`.
   void listen(Milliseconds patience) noexcept;
 
   bool hasCome() const { return socket_.isOpen(); }
@@ -51,11 +52,12 @@ class FrameProcess {
   std::int64_t doneCount() const { return doneCount_; }
   /// The result of the next step that is done. There must be one.
   DoneNotice takeDone();
-  /// Makes room for a step's data in the next buffer, of two, which no step uses. Throws std::runtime_error.
+  /// Makes room for a step's data in the next of the two buffers, which no step uses. Throws
+  /// std::runtime_error.
   void reserve(const StepWriter& data);
-  /// Tells which steps aren't handed over. Returns false if there is no memory to share them by.
+  /// Tells the process which steps aren't handed over. Returns false if there is no memory to share them.
   bool tellLeftOut(const LeftOutSteps& steps) noexcept;
-  /// Hands a step over, by the buffer in which there is room.
+  /// Hands a step over in the reserved buffer.
   void handOver(const StepWriter& data, StepNotice notice) noexcept;
 
   /// Whether scripts want the step; nullopt if that isn't known.

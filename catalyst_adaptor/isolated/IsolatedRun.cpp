@@ -177,7 +177,7 @@ std::pair<IsolatedRun::Wait, std::int64_t> IsolatedRun::wait(Progress progress, 
   }
 }
 
-/// Ends what is left of the processes, and reports the first rank's loss.
+/// Ends the remaining processes, and reports the loss of the lowest rank that has lost its own.
 int IsolatedRun::bury(std::optional<std::int64_t> step) {
   const bool restarts = options_.isolation.restart && step;
   const int code = guarded(
@@ -341,8 +341,9 @@ int IsolatedRun::handOver(std::int64_t step, double time, double now) {
       return leaveOut(step, time);
     }
   }
-  // Scripts may use all fields. Where a rank lacks a named one, too, all ranks hand over all: their processes
-  // take one array after the other together, and a message about a missing array lists the others.
+  // Scripts may use all fields, so they get all. If any rank lacks a field that a JSON run names, all ranks
+  // hand over all fields, too: their processes take the arrays collectively, and a message about a missing
+  // array lists the others.
   bool namedAlone = false;
   int code = guarded(
       self_, VDI_CATALYST_SCRIPT, [&] { namedAlone = hasNamedFields(); }, step);
@@ -368,12 +369,12 @@ int IsolatedRun::handOver(std::int64_t step, double time, double now) {
 }
 
 /// Collective: whether a rank's answer is yes. One rank's stopped process keeps the others' from their
-/// frames, so it alone is the cause to tell.
+/// frames, so only the stopped one is reported as the cause.
 bool IsolatedRun::isOfAny(bool answer) const {
   return meet<1>(self_.comm, {answer ? 1 : 0})[0] != 0;
 }
 
-/// A step for which there is no buffer. Without patience, that is as the run wants it.
+/// Leaves out a step for which there is no buffer. Without patience, that isn't an error.
 int IsolatedRun::leaveOut(std::int64_t step, double time) {
   ++leftOut_;
   // Where viewers may steer, not every step that isn't handed over would have had a frame.
@@ -384,10 +385,11 @@ int IsolatedRun::leaveOut(std::int64_t step, double time) {
   }
   if (options_.isolation.patience == 0.0) {
     if (!std::exchange(hasToldOfLeftOut_, true) && rank_ == 0) {
-      std::fprintf(stderr,
-                   "vdi_catalyst: step %lld: left out: two earlier steps' frames are still to be made; more "
-                   "such steps aren't told\n",
-                   static_cast<long long>(step));
+      std::fprintf(
+          stderr,
+          "vdi_catalyst: step %lld: left out: two earlier steps' frames are still to be made; further "
+          "ones aren't reported\n",
+          static_cast<long long>(step));
     }
     return VDI_CATALYST_OK;
   }
@@ -442,7 +444,7 @@ int IsolatedRun::finish() {
   if (!process_) return VDI_CATALYST_ENGINE;
   tellLeftOut();
   process_->finish();
-  // A viewer may pause a steered run for any time.
+  // A viewer may pause a steered run for any length of time.
   const double limit = isSteered() ? std::numeric_limits<double>::infinity()
                                    : std::max(options_.isolation.patience, startLimit);
   const auto progress = [&] { return process_->doneCount() + (process_->finished() ? 1 : 0); };

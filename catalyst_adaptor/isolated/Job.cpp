@@ -126,11 +126,11 @@ Job::Job(const std::string& program, const std::vector<std::string>& command) {
   const int error = posix_spawn(&starter, program.c_str(), &how.actions, &how.attributes,
                                 pointersOf(arguments).data(), pointersOf(environment).data());
   if (error != 0) throw std::runtime_error(program + " can't be started: " + std::strerror(error));
-  // It starts the job and ends, so that the job isn't a child whose end the simulation would have to expect.
+  // The starter starts the job and ends, so that the job isn't a child for which the simulation must wait.
   while (waitpid(starter, nullptr, 0) < 0 && errno == EINTR) {
   }
   pollfd events{life_.number(), POLLIN, 0};
-  constexpr int patience = 10000;  // ms; it has written its number by now, unless it has failed
+  constexpr int patience = 10000;  // ms; the job writes its number at once, unless it has failed
   if (poll(&events, 1, patience) != 1 ||
       read(life_.number(), &process_, sizeof process_) != static_cast<ssize_t>(sizeof process_))
     process_ = 0;

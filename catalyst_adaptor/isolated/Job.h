@@ -21,17 +21,17 @@ std::vector<std::string> commandOf(const std::string& launcher, const std::vecto
 class Job {
  public:
   /// Starts the command in a session of its own, with default signals, all cores, no descriptors of this
-  /// process, and its environment without what belongs to its own MPI job. `program` is the file of
-  /// vdi_catalyst_process. Throws std::runtime_error if that program can't be started.
+  /// process, and this process's environment without the variables of its own MPI job. `program` is the file
+  /// of vdi_catalyst_process. Throws std::runtime_error if that program can't be started.
   Job(const std::string& program, const std::vector<std::string>& command);
-  /// Ends it, if it still runs, and doesn't wait for that.
+  /// Ends the job if it still runs, and doesn't wait for its end.
   ~Job();
   Job(const Job&) = delete;
   Job& operator=(const Job&) = delete;
 
   /// Whether all its processes on this host have ended. Waits for that no longer than `patience`.
   bool isOver(std::chrono::milliseconds patience) const;
-  /// The first lines of what the launcher has written, in one line.
+  /// The first lines of the launcher's output, in one line.
   std::string said() const;
 
  private:

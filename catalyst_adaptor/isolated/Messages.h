@@ -28,7 +28,7 @@ enum class Say : std::uint32_t {
   Ended,     // int32 status of waitpid: the worker has ended, from its supervisor
 };
 
-/// The run, as the process's programs get it.
+/// The run's description for the process.
 struct Setup {
   std::int32_t rank = 0;
   bool isJson = false;

@@ -24,7 +24,8 @@ constexpr std::uint64_t page = 65536;  // a whole number of pages on every host,
       " MiB of memory shared with the process that makes frames: " + std::strerror(error));
 }
 
-/// A file beyond this process's limit would not only fail: the kernel sends a signal that ends the process.
+/// Throws if the size is beyond this process's limit, where the kernel would send a signal that ends the
+/// process.
 void requireWithinLimit(std::uint64_t bytes) {
   rlimit limit{};
   if (getrlimit(RLIMIT_FSIZE, &limit) == 0 && limit.rlim_cur < bytes) throwNoRoom(bytes, EFBIG);

@@ -13,7 +13,8 @@ namespace vdi::catalyst {
 
 namespace {
 
-constexpr std::uint64_t alignment = 4096;  // each block's values begin here, so that whole lines are copied
+constexpr std::uint64_t alignment =
+    4096;  // each block's values begin at a multiple, so that whole cache lines are copied
 
 std::uint64_t aligned(std::uint64_t offset) {
   return (offset + alignment - 1) / alignment * alignment;
@@ -137,7 +138,7 @@ StepData StepData::read(std::span<const std::byte> from) {
   const auto placed = [&]() -> const std::byte* {
     const auto offset = head.take<std::uint64_t>();
     if (offset == none) return nullptr;
-    // An array of no values may end the memory.
+    // An array without values may lie at the end of the memory.
     if (begin > from.size() || offset > from.size() - begin)
       throw std::runtime_error("a step's values lie outside the shared memory");
     return from.data() + begin + offset;

@@ -33,7 +33,7 @@ class StepWriter {
   StepWriter(std::uint64_t version, const std::vector<vdi_catalyst_block>& blocks, StepFields fields,
              const std::vector<Parameter>& parameters);
   std::uint64_t bytes() const { return bytes_; }
-  /// Copies all values, as they are now, and what describes them. `to` has room for `bytes()`.
+  /// Copies all values, as they are now, and their descriptions. `to` has room for `bytes()`.
   void write(std::span<std::byte> to) const;
 
  private:

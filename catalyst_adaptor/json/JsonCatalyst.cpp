@@ -88,7 +88,8 @@ class Reading {
   std::string colors_;
 };
 
-/// Where a run's frames are made: in the simulation, or in processes of their own, which may go on with it.
+/// The place where a run's frames are made: the simulation, the run's first process of its own, or a later
+/// one.
 enum class Place { Simulation, Process, NextProcess };
 
 int start(vdi_catalyst& self, const char* json, Place place) {

@@ -198,7 +198,7 @@ void RunEngine::deposit(Fields& fields, const std::string& name, std::int64_t st
     state_->deposits->make(fields, name, step);
 }
 
-/// Whether a due frame is to be made: by its condition and by the share of wall time. Collective.
+/// Whether the condition and the share of wall time let a due frame be made. Collective.
 bool RunEngine::isToBeMade(Fields& fields, std::int64_t step, double time) {
   State& state = *state_;
   if (state.measure) {
@@ -234,7 +234,7 @@ void RunEngine::leaveOut(std::int64_t step, double time) {
                     state.elapsed(), percent * state.budget.share());
     if (!std::exchange(state.hasToldOfBudget, true)) {
       fmt::print(stderr, "vdi_catalyst: step {}: left out: {}; {}\n", step, cause,
-                 state.log ? "the log has all such steps" : "more such steps aren't told");
+                 state.log ? "the log has all such steps" : "further such steps aren't reported");
     }
     if (state.log) state.log->add(runlog::LeftOut{step, time, cause});
   });
@@ -416,7 +416,7 @@ void RunEngine::prepare(Fields& fields, std::int64_t step, double time) {
   const bool cells = agreeOnCells(comm, fields, run_.field, run_.cells);
   if (cells) deposit(fields, run_.field, step);
   std::vector<Block> blocks;
-  std::array<double, 2> largest{};  // the most values a volume, and components
+  std::array<double, 2> largest{};  // the most values per unit of volume, and the most components
   comm.together([&] {
     blocks = fields.blocksOf(run_.field, cells, run_.component);
     for (const Block& block : blocks)
@@ -435,7 +435,8 @@ void RunEngine::prepare(Fields& fields, std::int64_t step, double time) {
   frame.step = step;
   frame.time = time;
   frame.range = state.firstRange.value_or(range);
-  // It stays the same, or opacities would jump where levels of refinement come and go.
+  // The unit distance stays the first frame's, or opacities would jump where levels of refinement come and
+  // go.
   const double unitDistance = unitDistanceOf(generator.scene().bounds, voxelVolume);
   if (!state.firstUnitDistance && voxelVolume > 0.0) state.firstUnitDistance = unitDistance;
   frame.unitDistance = state.firstUnitDistance.value_or(unitDistance);

@@ -103,7 +103,7 @@ bool RunSteering::take(const Steered& steered, std::int64_t step, double time) {
     if (stream_ != nullptr) {
       request = stream_->takeRequest(patience);
     } else {
-      std::this_thread::sleep_for(patience);  // a broadcast would busy a core while it waits
+      std::this_thread::sleep_for(patience);  // a waiting broadcast would keep a core busy
     }
     const std::string text =
         comm_.broadcastText([&] { return request ? stream::textOf(request->wish) : std::string(); }, 0);

@@ -34,10 +34,11 @@ std::string Agreement::enter(const std::string& operation) {
   const Meeting meeting = meet(Place::Entering, false, hash);
   if (meeting.last == Place::Entering && meeting.same) return {};
   if (meeting.failed) return otherFailed;
-  return "the ranks' scripts don't do the same: here comes an update of " +
-         operation.substr(0, operation.find(',')) + ", on another rank " +
-         (meeting.last == Place::Entering ? "that of another one" : "the script has ended before it") +
-         "; updates are collective, all ranks must do them in the same order";
+  return "the ranks' scripts differ: this rank updates " + operation.substr(0, operation.find(',')) +
+         ", but " +
+         (meeting.last == Place::Entering ? "another rank updates something else"
+                                          : "another rank's script has ended") +
+         "; updates are collective, so all ranks must do them in the same order";
 }
 
 bool Agreement::leavePart(bool failed) {

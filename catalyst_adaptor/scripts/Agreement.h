@@ -1,4 +1,4 @@
-// The agreement among ranks by which none waits for a rank whose script has ended.
+// An agreement among ranks, so that none waits for a rank whose script has ended.
 #pragma once
 
 #include <mpi.h>

@@ -251,7 +251,7 @@ struct Engine::State {
 void Engine::State::start(int fortranCommunicator, const std::string& plugin) {
   using Helper = vtkInSituInitializationHelper;
   if (!Helper::IsPythonSupported()) throw std::runtime_error("this ParaView was built without Python");
-  // Ranks begin with what they do together, so that none is missing because its own memory has run out.
+  // Ranks begin with their collective calls, so that none is missing because its own memory has run out.
   if (!comm) {
     comm.emplace(fortranCommunicator);
     agreement.emplace(MPI_Comm_f2c(fortranCommunicator));

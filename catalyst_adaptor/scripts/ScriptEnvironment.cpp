@@ -1,4 +1,4 @@
-#include <Python.h>  // it requires to be first
+#include <Python.h>  // Python requires it to be first
 
 #include "catalyst_adaptor/scripts/ScriptEnvironment.h"
 

@@ -165,7 +165,7 @@ class Worker {
     return all;
   }
 
-  /// The parameter's value, which it has from the simulation when it is first asked for.
+  /// The parameter's value in force. The first call declares the parameter with the simulation's value.
   double inForceNow(const Parameter& parameter) {
     const auto whole = [](double number) { return static_cast<std::int64_t>(number); };
     if (parameter.isWhole) {

@@ -1,4 +1,4 @@
-// Makes the frames of a rank of the simulation, in the process that is there for them.
+// The worker, which makes the frames of one rank of the simulation in a process of its own.
 #pragma once
 
 #include "catalyst_adaptor/isolated/Socket.h"

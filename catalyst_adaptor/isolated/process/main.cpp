@@ -2,8 +2,8 @@
 //
 //   launch COMMAND...    starts the run's MPI job, apart from the simulation, and ends
 //   serve NAME RANKS     finds a rank of the simulation on this host, starts the worker for it, supervises
-//                        it, and tells the rank how it ends
-//   work SOCKET SETUP    is a simulation of its own: it hands over to vdi_catalyst.h what the rank sends
+//                        it, and tells the rank how the worker ends
+//   work SOCKET SETUP    is a simulation of its own, which hands the rank's data to vdi_catalyst.h
 #include <fcntl.h>
 #include <poll.h>
 #include <sched.h>
@@ -50,7 +50,7 @@ std::vector<char*> pointersOf(std::vector<std::string>& texts) {
   return pointers;
 }
 
-/// The simulation may be bound to a core that is its own.
+/// Undoes the binding to cores that this process inherits from the simulation.
 void useAllCores() {
   cpu_set_t all;
   CPU_ZERO(&all);
@@ -80,7 +80,7 @@ int givenRank() {
 }
 
 /// Connects to a rank of the simulation on this host that has no process yet. Launchers may number their
-/// processes otherwise, so any will do. Returns its greeting with its descriptors.
+/// processes differently, so any rank will do. Returns its greeting with its descriptors.
 Socket::Received greetingOf(const std::string& name, int ranks, Socket& socket) {
   const int first = givenRank();
   for (int i = 0; i < ranks; ++i) {
@@ -127,7 +127,7 @@ void work(const Setup& setup, const Socket& socket, const Socket::Received& gree
   std::vector<std::string> arguments{ownFile(), "work", std::to_string(socket.number()),
                                      std::to_string(pages)};
   std::vector<std::string> environment = environmentOf(setup);
-  // From here on, its output goes where the rank's does.
+  // From here on, the worker's output goes where the rank's does.
   dup2(greeting.descriptors[0].number(), STDOUT_FILENO);
   dup2(greeting.descriptors[1].number(), STDERR_FILENO);
   umask(setup.umask);
@@ -168,7 +168,7 @@ int serve(const std::string& name, int ranks) {
   number.put(Say::Worker);
   number.put(std::int32_t{worker});
   (void)socket.send(number.bytes());
-  // Until the rank hangs up, or the worker ends.
+  // Waits until the rank hangs up, or the worker ends.
   std::array<pollfd, 2> events{pollfd{socket.number(), 0, 0}, pollfd{ends.number(), POLLIN, 0}};
   int status = 0;
   for (;;) {
@@ -185,7 +185,7 @@ int serve(const std::string& name, int ranks) {
   end.put(Say::Ended);
   end.put(std::int32_t{status});
   (void)socket.send(end.bytes());
-  // If this process ended now, a launcher would end the whole job. The simulation does that once all its
+  // If this process ended now, a launcher would end the whole job. The simulation ends the job once all its
   // ranks know.
   const bool isGood = WIFEXITED(status) && WEXITSTATUS(status) == 0;
   if (!isGood) poll(events.data(), 1, -1);
