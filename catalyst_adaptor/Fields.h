@@ -76,7 +76,7 @@ class Fields {
   /// The offset of an array's values, in cells. It may be given before the array.
   glm::dvec3 offsetOf(const std::string& name, bool cells) const;
 
-  int componentsOf(const std::string& name, bool cells) const;  // 1 if no block has the array
+  int componentsOf(const std::string& name, bool cells) const;  // 1 if none of this rank's blocks has it
   /// An array's values where the simulation has them, one for each block; null where a block lacks them.
   /// Empty if this rank lacks the array.
   struct Values {

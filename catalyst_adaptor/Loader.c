@@ -120,8 +120,7 @@ typedef struct vdi_given {
   const vdi_catalyst_pipeline* pipelines;
   int32_t count;
   const char* json;
-  int kind; /* 0: scripts, 1: pipelines, 2: JSON, 3: JSON whose frames are made here, with `count` as goes_on
-             */
+  int kind; /* 0: scripts, 1: pipelines, 2: JSON, 3: JSON, frames made here, `count` is goes_on */
 } vdi_given;
 
 static int initialize_with(const vdi_engine* engine, int32_t communicator, const vdi_given* given,

@@ -277,7 +277,7 @@ void Grid::addField(const Node& field, const vdi_catalyst_block& block) {
   if (!association) field.refuse("has no association 'vertex' or 'element'");
   const Node values = field.at("values");
   const std::vector<Leaf> components = componentsOf(values);
-  // vdi_catalyst.h doesn't take such an array. Frames of other arrays go on.
+  // vdi_catalyst.h doesn't take such an array. Other arrays still get frames.
   if (components.size() > maxComponents) return leaveOut(field.name());
   const Leaf& leaf = components.front();
   const Elements elements = elementsOf(field, countsOf(block, *association), leaf.count);

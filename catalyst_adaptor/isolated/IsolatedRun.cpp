@@ -388,7 +388,7 @@ int IsolatedRun::leaveOut(std::int64_t step, double time) {
       std::fprintf(
           stderr,
           "vdi_catalyst: step %lld: left out: two earlier steps' frames are still to be made; further "
-          "ones aren't reported\n",
+          "such steps aren't reported\n",
           static_cast<long long>(step));
     }
     return VDI_CATALYST_OK;

@@ -13,8 +13,7 @@ namespace vdi::catalyst {
 
 namespace {
 
-constexpr std::uint64_t alignment =
-    4096;  // each block's values begin at a multiple, so that whole cache lines are copied
+constexpr std::uint64_t alignment = 4096;  // of each block's values, so that whole cache lines are copied
 
 std::uint64_t aligned(std::uint64_t offset) {
   return (offset + alignment - 1) / alignment * alignment;
