@@ -145,7 +145,7 @@ with Session() as session:
     # The server can't make a VDI of this blend mode.
     image.BlendMode = "Maximum Intensity"
     simple.Render(view)
-    check("what makes it has failed" in pvtest.message_in(view), "the view says that the server has failed")
+    check("its filter or reader has failed" in pvtest.message_in(view), "the view says that the server has failed")
     image.BlendMode = "Composite"
     simple.Render(view)
     picture = pvtest.screenshot(view, "client_server_again.png", SIZE)

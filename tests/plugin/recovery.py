@@ -9,7 +9,7 @@ import pvtest
 from paraview import simple
 from pvtest import check
 
-SIZE, FAILED = [160, 120], "what makes it has failed"
+SIZE, FAILED = [160, 120], "its filter or reader has failed"
 
 
 def is_made(image):

@@ -163,7 +163,7 @@ read_ahead(15)
 os.truncate(files[15], os.path.getsize(files[15]) // 2)
 view.ViewTime = times[15]
 lines = pvtest.standard_error(lambda: screenshot(view, "truncated"))
-check("what makes it has failed" in pvtest.message_in(view),
+check("its filter or reader has failed" in pvtest.message_in(view),
       "a file that isn't whole any more isn't shown, and the view says so")
 check(lines.count("invalid .vdi file") == 1, "one line says why the file that isn't whole isn't shown")
 shutil.copy(kinds[15 % KINDS], files[15])

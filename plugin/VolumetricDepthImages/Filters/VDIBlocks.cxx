@@ -261,7 +261,7 @@ void addLeaf(vtkDataObject* leaf, const ArrayChoice& choice, const std::string& 
   addImage(image, choice, name, blocks);
 }
 
-/// A filter that passes a data set on gives it a new time of modification; the arrays keep theirs.
+/// Uses the arrays' modification times: a filter that passes a data set on changes only the data set's own.
 void addIdentity(vtkDataObject* leaf, std::vector<std::uint64_t>& identity) {
   auto* image = vtkImageData::SafeDownCast(leaf);
   if (image == nullptr) {
@@ -330,7 +330,7 @@ std::vector<std::uint64_t> identityOf(vtkDataObject* data) {
     addIdentity(data, identity);
     return identity;
   }
-  // The time of AMR data covers which parts of a level other levels refine.
+  // AMR data's modification time also changes when other levels refine other parts of a level.
   if (vtkOverlappingAMR::SafeDownCast(data) != nullptr) identity.push_back(data->GetMTime());
   const auto iterator = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
   for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem()) {

@@ -1,4 +1,4 @@
-// The state of a file, by which a reader sees that the file has changed.
+// The state of a file, from which a reader sees that the file has changed.
 #ifndef VDIFileState_h
 #define VDIFileState_h
 
@@ -17,7 +17,7 @@ struct FileState {
   bool operator==(const FileState&) const = default;
 };
 
-/// Nullopt if there is no such file.
+/// The file's state; nullopt if there is no such file.
 inline std::optional<FileState> stateOf(const std::string& name) {
   std::error_code error;
   FileState state;

@@ -38,7 +38,7 @@ struct Load {
   std::vector<vdi::Block> blocks;
   vdi::ScalarArray array;    // the same on all ranks
   double voxelVolume = 0.0;  // volume of the smallest voxel on any rank; 0 without voxels
-  std::string lack;          // why this rank has no block with the array, if it has blocks
+  std::string lack;          // the reason why none of this rank's blocks has the array
 };
 
 /// Throws vdi::Error if there is no input. In situ, a misspelt channel in a script has that effect.

@@ -17,10 +17,10 @@ namespace pv {
 /// Sets VDI.camera and VDI.bounds.
 void setPlace(vtkFieldData* fields, const vdi::Camera& camera, const vdi::Box& bounds);
 
-/// Nullopt if there is no scene, or an empty one.
+/// The scene's box; nullopt if there is no scene, or an empty one.
 std::optional<vdi::Box> boxIn(vtkFieldData* fields);
 
-/// Nullopt if there is no camera.
+/// The camera; nullopt if there is none.
 std::optional<vdi::Camera> cameraIn(vtkFieldData* fields);
 
 /// The world positions of a picture's corners: lower left, lower right, upper right, upper left. The picture

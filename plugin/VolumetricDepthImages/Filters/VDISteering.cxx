@@ -98,7 +98,7 @@ void SetColours(vtkSMProxy* generator, const Wish& wish) {
   constexpr bool toCurrentRange = true;
   if (wish.preset) vtkSMTransferFunctionProxy::ApplyPreset(colours, wish.preset->c_str(), toCurrentRange);
   vtkSMProxy* opacities = FunctionOf(generator, "ScalarOpacityFunction");
-  // Without one of its own, the filter uses the map's.
+  // Without an opacity function of its own, the filter uses the map's.
   if (opacities == nullptr)
     opacities = vtkSMPropertyHelper(colours, "ScalarOpacityFunction", true).GetAsProxy();
   for (vtkSMProxy* const function : {colours, opacities}) {

@@ -34,8 +34,8 @@ bool isMasked(const vdi::Block& block, const glm::ivec3& at) {
                      [&at](const vdi::IndexBox& box) { return box.contains(at); });
 }
 
-/// Takes one of each `step` values. Its place among them differs from one `step` to the next, so that the
-/// sample follows no pattern of rows.
+/// Takes one of each `step` consecutive values. Its place among them varies, so that the sample follows no
+/// pattern of rows.
 std::vector<double> sampleOf(std::span<const vdi::Block> blocks, std::uint64_t step) {
   constexpr double golden = 0.6180339887498949;
   std::vector<double> values;
@@ -78,7 +78,7 @@ void setShownValues(vtkImageData* image, const vdi::ScalarArray& array, std::spa
   if (array.name.empty() || array.name.starts_with("VDI.") || values.empty()) return;
   vtkNew<vtkDoubleArray> shown;
   shown->SetName(array.name.c_str());
-  // No component is the phase. ParaView takes the magnitude, which of a single component is the value itself.
+  // The phase gets an array of one component. ParaView shows its magnitude, which is the value itself.
   shown->SetNumberOfComponents(array.component == vdi::phase ? 1 : array.components);
   shown->SetNumberOfTuples(static_cast<vtkIdType>(values.size()));
   shown->Fill(0.0);

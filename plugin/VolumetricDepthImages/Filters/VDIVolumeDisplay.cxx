@@ -233,11 +233,11 @@ std::string displayIssues(vtkSMProxy* shown) {
     issues += issue;
   };
   if (isOn(shown, "UseTransfer2D")) {
-    add("The view colours this volume by a 2-D transfer function (its Use 2D Transfer Function), in place of "
-        "which VolumetricDepthImage uses the colour map and the opacity function.");
+    add("The view colours this volume by a 2-D transfer function (its Use 2D Transfer Function). "
+        "VolumetricDepthImage uses the colour map and the opacity function instead.");
   } else if (isOn(shown, "UseSeparateOpacityArray")) {
-    add("The view takes this volume's opacity from another array (its Use Separate Opacity Array), in place "
-        "of which VolumetricDepthImage uses the array that it shows.");
+    add("The view takes this volume's opacity from another array (its Use Separate Opacity Array). "
+        "VolumetricDepthImage uses the array that it shows instead.");
   }
   // ParaView 5.13 has renamed Position to Translation.
   constexpr std::array transforming{"Position", "Translation", "Scale", "Orientation"};

@@ -29,7 +29,8 @@ void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, vtkPVDataInformation* d
 void takeBlending(vtkSMProxy* filter, vtkSMProxy* shown);
 
 /// The message for a user whose view shows the volume by properties that the filter lacks: its blend mode,
-/// another array's opacity, a 2-D transfer function, another place. Empty if the filter shows what it shows.
+/// another array's opacity, a 2-D transfer function, another place. Empty if the filter shows what the view
+/// shows.
 std::string displayIssues(vtkSMProxy* shown);
 
 }  // namespace pv

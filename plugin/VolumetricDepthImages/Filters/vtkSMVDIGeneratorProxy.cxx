@@ -257,8 +257,8 @@ void vtkSMVDIGeneratorProxy::FollowArray() {
   if (!this->Shown) this->Shown = now;  // after a state file was loaded
   if (now == *this->Shown || now.Input == nullptr) return;
   const Set choosing(this->Choosing);
-  // The panel blanks the choice of a filter that a script has made before its input had data. The filter
-  // keeps its array.
+  // The panel blanks the array of a filter that a script made before its input had data. The filter keeps its
+  // array.
   if (now.Array.empty() && !this->Shown->Array.empty()) {
     now.Array = this->Shown->Array;
     now.Association = this->Shown->Association;
@@ -292,7 +292,7 @@ bool vtkSMVDIGeneratorProxy::HasMapOf(const std::string& name) {
   vtkSMProxy* map = table.GetNumberOfElements() > 0 ? table.GetAsProxy() : nullptr;
   if (map == nullptr) return false;
   if (map == this->ChosenMap) return true;
-  // A map from a state file. ParaView leaves spaces and the like out of the names of maps.
+  // The map may come from a state file. ParaView removes spaces and similar characters from maps' names.
   const char* registered = this->GetSessionProxyManager()->GetProxyName("lookup_tables", map);
   return registered != nullptr && !name.empty() &&
          std::string_view(registered).starts_with(vtkSMCoreUtilities::SanitizeName(name) + ".");
@@ -346,7 +346,7 @@ int vtkSMVDIGeneratorProxy::ComponentsOf(const std::string& name, int associatio
   if (ranksWithClients() == nullptr) return here;
   // A rank without blocks doesn't know the array, but must take the same next steps as the others. A known
   // array isn't asked for again, so that ranks that disagree on the component alone don't wait here for ever.
-  // The next update reports that they do.
+  // The next update reports the disagreement.
   std::array<double, 1> most{static_cast<double>(here)};
   if (!takeLargest(most, "components of VolumetricDepthImage's array")) return here;
   const int components = static_cast<int>(most[0]);
@@ -369,8 +369,8 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
                          vtkSMPropertyHelper(this, "CameraFocalPoint").GetDoubleArray();
   vtkSMPropertyHelper resolution(this, "Resolution");
   const bool hasSize = resolution.GetAsInt(0) != 0 || resolution.GetAsInt(1) != 0;
-  // A script that sets both describes the whole VDI. Saved Python states do so, and leave out the values that
-  // are the default.
+  // A script that sets both describes the whole VDI. Saved Python states set both, and leave out default
+  // values.
   if (!hasCamera || !hasSize || this->HasViewpointOfView) {
     this->TakeUnitDistance();
     pv::takeShading(this, shown, view);
@@ -604,7 +604,7 @@ bool vtkSMVDIGeneratorProxy::RangeOfScalars(const char* name, int association, s
     }
     vtkPVDataInformation* data = source->GetDataInformation(input.GetOutputPort());
     if (vtkPVArrayInformation* array = data->GetArrayInformation(name, association)) {
-      // The filter's component. The filter reports one that doesn't exist.
+      // The range is that of the filter's component. The filter reports a component that doesn't exist.
       const int wanted = vtkSMPropertyHelper(this, "Component").GetAsInt();
       const int components = array->GetNumberOfComponents();
       if (wanted == vdi::phase && components == 2) {

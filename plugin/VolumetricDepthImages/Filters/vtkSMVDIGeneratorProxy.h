@@ -6,9 +6,9 @@
  * shows the input, or whose camera a user has placed: the camera if position and focal point are the same,
  * Resolution if it is 0 0, ScalarOpacityUnitDistance if it is 0, Shade, Diffuse and Ambient if the view shows
  * a shaded volume, Cropping and CroppingBox if it shows a cropped one, BlendMode and IsosurfaceValues if it
- * shows a volume, and Lights. Of these groups it takes those of which each property has its default. If both
- * camera and Resolution are set, other than by SetViewpoint, it takes nothing. Traces and state files have
- * the values. Proxies that a state file makes, or the undo of a deletion, take nothing.
+ * shows a volume, and Lights. It takes a group only if all its properties have their defaults.
+ * If both camera and Resolution are set, other than by SetViewpoint, it takes nothing. Traces and state files
+ * have the values. Proxies made by a state file, or by the undo of a deletion, take nothing.
  *
  * If LookupTable has never been set, the proxy takes ParaView's colour map for the chosen array: the one that
  * a representation of the input uses in the active view, or would use, with its opacity function. The proxy
@@ -65,7 +65,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// Makes the next update count as the first again. Call it when a user undoes the first Apply.
   void Forget();
 
-  /// The view, or a comparative view's root view; null if it is no render view.
+  /// The view, or a comparative view's root view; null if that isn't a render view.
   static vtkSMRenderViewProxy* RenderViewOf(vtkSMProxy* view);
   /// Sets the camera properties of `proxy`, which has a viewpoint (VolumetricDepthImage, RenderVDI), to the
   /// camera of `view`. UpdateVTKObjects sends them.
@@ -91,8 +91,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// Releases a held filter (vtkVDIGenerator::Hold), and stops it from giving views an earlier output. Call
   /// it before an update that needs the VDI of the current maps and properties.
   void ReleaseNow();
-  /// Whether all ranks update that proxy now, where such an update is collective. Reports an error if another
-  /// rank doesn't.
+  /// Returns whether all ranks update that proxy now; true where updates aren't collective. Reports an error
+  /// if another rank doesn't.
   static bool EnterUpdate(vtkSMProxy* proxy);
   /// For writers, extractors and RenderVDI, which update the filters upstream of them without the filters'
   /// proxies. Lets all generators upstream of `proxy` take what isn't set, and releases them. Collective if

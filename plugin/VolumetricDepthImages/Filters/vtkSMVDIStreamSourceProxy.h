@@ -3,8 +3,8 @@
  * @brief the source VDIStream, which keeps the token of a link apart from its URL
  *
  * States, traces and settings have the property URL. So this proxy removes the token from a pasted link at
- * once, and sends it to the source by itself. The token is no property, because a trace would write it down.
- * The proxy keeps the tokens of earlier links, because undo and redo bring back their addresses alone.
+ * once, and sends it to the source by itself. The token isn't a property, because a trace would write it
+ * down. The proxy keeps the tokens of earlier links, because undo and redo bring back their addresses alone.
  */
 #ifndef vtkSMVDIStreamSourceProxy_h
 #define vtkSMVDIStreamSourceProxy_h

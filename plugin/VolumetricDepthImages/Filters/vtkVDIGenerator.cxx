@@ -278,7 +278,7 @@ int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector**
     info->Get(Pipeline::WHOLE_EXTENT(), whole);
     info->Set(Pipeline::UPDATE_EXTENT(), whole, 6);
   } else {
-    info->Remove(Pipeline::UPDATE_EXTENT());  // the picture's; composite sources would be asked for it
+    info->Remove(Pipeline::UPDATE_EXTENT());  // the picture's, which composite sources would get
   }
   return 1;
 }

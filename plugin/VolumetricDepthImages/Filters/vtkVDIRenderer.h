@@ -32,7 +32,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
    * The viewpoint V_N, as vtkCamera has it. With UseOriginalCamera (default off), and while position and
    * focal point are the same, as they are by default, the filter uses the VDI's own viewpoint, turned by
    * Azimuth degrees as vtkCamera::Azimuth turns: about the focal point, around the view-up as set. The filter
-   * warns of a viewpoint that can't show the VDI truly (vdi::ViewpointIssue), unless the picture before had
+   * warns of a viewpoint that can't show the VDI truly (vdi::ViewpointIssue), unless the previous picture had
    * the same issue.
    */
   vtkSetVector3Macro(CameraPosition, double);

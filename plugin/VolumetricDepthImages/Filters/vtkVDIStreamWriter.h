@@ -32,7 +32,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
 
   ///@{
   /// Settings of the server. Changes after its start have no effect.
-  vtkSetStringMacro(Host);  // the server listens at this host's address
+  vtkSetStringMacro(Host);  // the server listens on this host's address
   vtkGetStringMacro(Host);
   vtkSetMacro(Port, int);  // 0: a free port
   vtkGetMacro(Port, int);

@@ -2,8 +2,8 @@
  * @class vtkVDIWriter
  * @brief writes the VDI of its input as a .vdi file or as a page for browsers, or its picture as PNG
  *
- * A file name that ends in .html gets a page with the VDI inside (vdi/page/Page.h), one that ends in .png the
- * picture over Background.
+ * A file whose name ends in .html gets a page with the VDI inside (vdi/page/Page.h), and one whose name ends
+ * in .png gets the picture over Background.
  *
  * Input: the output of vtkVDIGenerator or vtkVDIReader; for pictures that of vtkVDIRenderer, too. The rank
  * that has the VDI writes, under a temporary name that is renamed when the file is whole; other ranks do

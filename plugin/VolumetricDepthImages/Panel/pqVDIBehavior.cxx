@@ -57,7 +57,7 @@ void pqVDIBehavior::startup() {
   this->lookAtServers();
 }
 
-/// A user has made the filter from the menu.
+/// Called when a user has made the filter from the menu.
 void pqVDIBehavior::filterCreated(pqPipelineSource* source) {
   auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(source->getProxy());
   if (generator == nullptr) return;
@@ -83,9 +83,9 @@ void pqVDIBehavior::lookAtServers() {
 }
 
 void pqVDIBehavior::shutdown() {
-  // Deletes it here, because at this object's end the list of views that it empties no longer exists.
+  // Deletes pqVDIStillFrames here: the list of views that it empties no longer exists at this object's end.
   delete this->findChild<pqVDIStillFrames*>();
-  // The sources own what this object made.
+  // The sources own the objects that this one has made.
   pqApplicationCore* core = pqApplicationCore::instance();
   if (core == nullptr) return;
   for (QObject* sender : std::initializer_list<QObject*>{

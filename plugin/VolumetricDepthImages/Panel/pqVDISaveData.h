@@ -1,6 +1,6 @@
 // Makes File > Save Data offer .vdi files first if a VDI is selected. ParaView offers the extension last used
 // for the same type of data, at first .pvd, and a VDI has the type of any image. A name without an extension
-// would then write all of the VDI's arrays as they are. The first offer for other images stays.
+// would then write all of the VDI's arrays as they are. Other images keep ParaView's first offer.
 #ifndef pqVDISaveData_h
 #define pqVDISaveData_h
 

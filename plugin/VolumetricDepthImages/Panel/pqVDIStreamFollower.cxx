@@ -38,7 +38,7 @@ void pqVDIStreamFollower::lookFromViewpoint() {
 }
 
 void pqVDIStreamFollower::look() {
-  // Doesn't interrupt a hand that turns the view, and doesn't wait for a server at work.
+  // Neither interrupts a user who turns the view nor waits for a busy server.
   if (this->Source->modifiedState() == pqProxy::UNINITIALIZED ||
       QApplication::mouseButtons() != Qt::NoButton || this->Source->getServer()->isProgressPending())
     return;

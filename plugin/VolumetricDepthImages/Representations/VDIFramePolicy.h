@@ -24,7 +24,7 @@ struct PictureForm {
 /// Chooses the form of frames from the time that earlier ones took. Times are seconds.
 class VDIFramePolicy {
  public:
-  /// The form that gives `rate` frames a second, with one pixel for each 64 of `port` at least.
+  /// The form that gives `rate` frames a second, with at least one pixel for each 64 of `port`.
   PictureForm interactive(VDIBuffers& buffers, const vdi::View& view, const glm::ivec2& port, double rate);
   /// Whether a window's still frame would wait too long for a picture of all lists.
   bool takesLong(const VDIBuffers& buffers, const glm::ivec2& port) const;
@@ -39,7 +39,7 @@ class VDIFramePolicy {
    public:
     void measure(double seconds, double renderSeconds, double pixels);
     void guess(double renderSeconds, double pixels);
-    /// Pixels that give `rate` frames a second. The VDI gets half of the time at least.
+    /// Pixels that give `rate` frames a second. The VDI gets at least half of the time.
     std::optional<double> pixels(double rate) const;
     std::optional<double> seconds(double pixels) const;
 

@@ -34,7 +34,7 @@ class vtkVDIMessage : public vtkTextActor {
 
   std::string Text;
   Place At = Place::Middle;
-  bool IsNew = false;  // it has not been drawn since it changed
+  bool IsNew = false;  // true until the changed text is drawn
 };
 
 #endif

@@ -21,12 +21,12 @@ class vtkPolyData;
 
 namespace pv {
 
-/// The problem after the VDI's filter or reader has failed. That reports the reason as an error.
-constexpr const char* failedUpstream = "There is no VDI to show: what makes it has failed.";
+/// The problem after the VDI's filter or reader has failed, which reports the reason as an error.
+constexpr const char* failedUpstream = "There is no VDI to show: its filter or reader has failed.";
 
 /// The beginning of the problem while a source waits for a VDI (VDI.waiting).
 constexpr const char* noneYet = "There is no VDI to show yet: ";
-/// Whether it is one of these two problems. A view shows them, but doesn't repeat them as errors.
+/// Whether `problem` is one of these two. A view shows them, but doesn't repeat them as errors.
 bool isSaidUpstream(const std::string& problem);
 
 /// Empties `piece`, for ranks and clients without a VDI.

@@ -2,8 +2,8 @@
  * @class vtkVDIForViews
  * @brief passes data on to the parts of a view, and tells the filter upstream that they are for a view
  *
- * Each representation in a view updates its input by itself, and the axes of a data set do, too.
- * vtkVDIGenerator may give those an earlier VDI (vtkVDIGenerator::DeferViews), but no other consumers.
+ * Each representation in a view updates its input by itself, and so do the axes of a data set.
+ * vtkVDIGenerator may give an earlier VDI to these consumers (vtkVDIGenerator::DeferViews), but to no others.
  */
 #ifndef vtkVDIForViews_h
 #define vtkVDIForViews_h

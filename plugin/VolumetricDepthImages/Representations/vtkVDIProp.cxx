@@ -85,7 +85,7 @@ struct vtkVDIProp::Internals {
 
   pv::VDIPainter Painter;
   pv::VDIFramePolicy Policy;
-  std::vector<float> Window;  // memory of a depth buffer, which frames of an orbit use again
+  std::vector<float> Window;  // memory of a depth buffer, which frames of an orbit reuse
   std::vector<float> Ends;    // depth at which each pixel's ray ends at an object
   bool WasSmooth = false;     // the renderer smooths edges, except in this frame
 
