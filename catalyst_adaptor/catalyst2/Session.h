@@ -57,7 +57,7 @@ class Session {
   vdi_catalyst* catalyst_ = nullptr;
   Grid grid_;
   bool handedOver_ = false;        // whether all ranks have handed over the current grid
-  bool hasLostEngine_ = false;     // whether the last vdi_catalyst_execute returned so
+  bool hasLostEngine_ = false;     // by the last vdi_catalyst_execute
   std::set<std::string> leftOut_;  // reported fields
   std::int64_t made_ = 0;          // number of steps
   std::int64_t failed_ = 0;

@@ -89,7 +89,7 @@ class FrameProcess {
   SharedPages setup_;
   std::optional<int> startCode_;
   bool isGone_ = false;
-  bool isGivenUp_ = false;     // for want of memory
+  bool isGivenUp_ = false;     // because memory ran out
   std::optional<int> status_;  // the worker's, as waitpid has it
   pid_t worker_ = 0;
   std::int64_t handedOver_ = 0;

@@ -47,8 +47,8 @@ std::optional<double> patienceFromEnvironment() {
   return seconds ? std::optional<double>(*seconds) : std::nullopt;
 }
 
-/// The first rank's answer: how the run is isolated, if at all. `given` is what its text says; the
-/// environment, where it says something, counts more.
+/// The first rank's answer: how the run is isolated, if at all. `given` comes from the run's text; the
+/// environment overrides it.
 std::optional<vdi::config::RunIsolation> isolationOf(std::optional<vdi::config::RunIsolation> given) {
   const std::optional<std::string> wish = vdi::environmentText("VDI_ISOLATION");
   if (wish == "none") return std::nullopt;
@@ -69,7 +69,7 @@ int share(vdi_catalyst& self, std::string& text) {
   return code;
 }
 
-/// Collective: what the first rank finds out, on all ranks.
+/// Collective: the first rank's decision, which all ranks get.
 class Decision {
  public:
   explicit Decision(vdi_catalyst& self) : self_(self) { MPI_Comm_rank(self.comm, &rank_); }

@@ -45,7 +45,7 @@ class IsolatedRun {
   /// Hands the step over if it is wanted. Returns the code of earlier steps' frames that have become known,
   /// or VDI_CATALYST_ENGINE if the processes have ended.
   int execute(std::int64_t step, double time);
-  /// Waits for the frames under way, and ends the run. Returns the worst code of what wasn't known yet.
+  /// Waits for the frames under way, and ends the run. Returns the worst code that wasn't known yet.
   int finish();
 
   Parameters& parameters() { return parameters_; }

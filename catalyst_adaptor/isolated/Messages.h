@@ -56,7 +56,7 @@ struct StepNotice {
   bool isNewBuffer = false;  // its pages come with this message
 };
 
-/// Steps at which a frame was due, and which were left out, for want of a buffer.
+/// Steps at which a frame was due, but which were left out because no buffer was free.
 struct LeftOutSteps {
   struct Step {
     std::int64_t step = 0;
@@ -75,8 +75,8 @@ struct DoneNotice {
   std::vector<double> parameters;  // the values in force, in the order of declaration
 };
 
-/// Whether the launcher of an MPI job sets such a variable ("NAME=value") for each of its processes. Those of
-/// the simulation's job must not reach another job; those of the other job must stay.
+/// Whether an MPI launcher sets this variable ("NAME=value") for each process of its job. The variables of
+/// the simulation's job must not reach another job, which must keep its own.
 bool isOfMpiJob(std::string_view variable);
 
 }  // namespace vdi::catalyst

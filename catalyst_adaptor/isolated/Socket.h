@@ -17,7 +17,7 @@ namespace vdi::catalyst {
 std::string newSocketName();
 
 /// Whole messages, in order, within this host. No function throws or raises a signal when the other side is
-/// gone: sending fails, and receiving says so.
+/// gone: sending fails, and receiving returns Result::Gone.
 class Socket {
  public:
   Socket() = default;

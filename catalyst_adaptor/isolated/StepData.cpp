@@ -19,7 +19,7 @@ std::uint64_t aligned(std::uint64_t offset) {
   return (offset + alignment - 1) / alignment * alignment;
 }
 
-/// In place of an offset: the block lacks the array, or the particles have no such numbers.
+/// Replaces the offset if the block lacks the array, or the particles lack the numbers.
 constexpr std::uint64_t none = ~std::uint64_t{0};
 
 int componentsOf(const Fields::NamedArray& array) {

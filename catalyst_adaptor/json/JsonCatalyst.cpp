@@ -88,7 +88,7 @@ class Reading {
   std::string colors_;
 };
 
-/// The place where a run's frames are made: the simulation, the run's first process of its own, or a later
+/// The process that makes a run's frames: the simulation's, a separate one, or the successor of a separate
 /// one.
 enum class Place { Simulation, Process, NextProcess };
 

@@ -51,7 +51,7 @@ static void advance(const DMDALocalInfo* box, Cell*** now, Cell*** next) {
 }
 
 /* Hands over both unknowns in place in the local vector: interleaved, and without the ghosts around
- * them. PETSc sets no corners of a star's ghosts; the adaptor asks the neighbours itself. */
+ * them. PETSc leaves the corners of a star's ghosts unset; the adaptor asks the neighbours itself. */
 static int hand_over(vdi_catalyst* vdi, const DMDALocalInfo* box, Cell*** now) {
   const int type = sizeof(PetscReal) == sizeof(double) ? VDI_CATALYST_F64 : VDI_CATALYST_F32;
   const vdi_catalyst_block block = {{box->xm, box->ym, box->zm},

@@ -46,8 +46,8 @@ class Preparation {
   /// Asks the thread to stop. The thread checks this once a band. One rank's call is enough.
   void giveUp() { Unwanted = true; }
   bool isGivenUp() const { return Unwanted; }
-  /// With several ranks: carries out what the ranks' threads do together, in this turn and in those before
-  /// it. Doesn't wait for other ranks.
+  /// With several ranks: carries out the collective operations of the ranks' threads, in this turn and in
+  /// those before it. Doesn't wait for other ranks.
   void serve(std::chrono::milliseconds most) { Of->serve(most); }
 
   enum class End { Good, GivenUp, Failed };

@@ -105,7 +105,7 @@ class Regeneration {
             const std::function<bool(double share)>& goesOn);
   bool preparesOnRanks() const { return preparing_ && preparing_->hasRanks(); }
   int percent() const { return preparing_ ? preparing_->percent() : -1; }
-  /// Carries out what the ranks' threads do together.
+  /// Carries out the collective operations of the ranks' threads.
   void serve(std::chrono::milliseconds most);
 
  private:

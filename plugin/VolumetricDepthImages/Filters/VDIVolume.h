@@ -82,7 +82,7 @@ class Volume {
   /// the main thread calls it, because no other thread may make a communicator. On one rank, the caller needs
   /// the turn. Throws vdi::Error on all ranks.
   void make();
-  /// Carries out what the thread with the turn does together with other ranks. Returns after `most`.
+  /// Carries out the collective operations of the thread that has the turn. Returns after `most`.
   void serve(std::chrono::milliseconds most) { funnel_.serve(most); }
 
   // The holder of the turn.

@@ -1,6 +1,6 @@
 /**
  * @class vtkSMVDIGeneratorProxy
- * @brief gives VolumetricDepthImage what the active view shows: viewpoint, size, colour map and opacity
+ * @brief gives VolumetricDepthImage the active view's viewpoint, size, colour map and opacity
  *
  * At the first update, the proxy takes unset properties from the active view, if that is a render view that
  * shows the input, or whose camera a user has placed: the camera if position and focal point are the same,
@@ -78,8 +78,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// Sets camera and Resolution to the view's, and traces it. Returns "", or the reason why the view can't be
   /// used; then it sets nothing.
   std::string SetViewpoint(vtkSMViewProxy* view);
-  /// The angle in degrees, at the middle of what is shown of the input, between the view's camera and the
-  /// camera that is set.
+  /// The angle in degrees, at the middle of the input's shown part, between the view's camera and the camera
+  /// that is set.
   double DegreesFrom(vtkSMRenderViewProxy* view);
 
   /// The estimate for the VDI that the panel's numbers describe, applied or not; nullopt with PictureOnly.

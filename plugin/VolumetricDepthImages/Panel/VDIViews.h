@@ -1,4 +1,4 @@
-// The views that show a source, or what other filters make of it.
+// The views that show a source, or the results of other filters on it.
 #ifndef VDIViews_h
 #define VDIViews_h
 

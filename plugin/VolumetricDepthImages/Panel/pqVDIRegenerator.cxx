@@ -110,7 +110,7 @@ void pqVDIRegenerator::watchMaps() {
   watch(vtkSMPropertyHelper(this->generator(), "ScalarOpacityFunction").GetAsProxy());
 }
 
-/// Whether a view shows the VDI, or what other filters make of it.
+/// Whether a view shows the VDI, or the results of other filters on it.
 bool pqVDIRegenerator::isUsed() const {
   const QList<pqView*> views = pqApplicationCore::instance()->getServerManagerModel()->findItems<pqView*>();
   return std::any_of(views.begin(), views.end(),
