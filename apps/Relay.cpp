@@ -37,7 +37,7 @@ void Relay::follow(const stream::Client::Standing& standing) {
     seriesPassed_ += more.size();
     server_->append(std::move(more));
   }
-  // Until the other server has told its state, `standing` has the state of the connection before.
+  // Until the other server sends its state, `standing` has the previous connection's.
   if (standing.hasState) phase_ = standing.state.phase;
   tell(standing);
 }

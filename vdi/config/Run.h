@@ -45,7 +45,7 @@ struct RunCamera {
 };
 
 /// A condition on a field's values that must hold at a step for a frame to be made. NaN doesn't count;
-/// infinite values count for Max and Min alone.
+/// infinite values count only for Max and Min.
 struct RunCondition {
   // Change: the distance that the mean has moved since the last frame
   enum class Measure { Max, Min, Mean, Change };

@@ -22,7 +22,7 @@ struct VdiDecoder::State {
   std::uint64_t added = 0;
   std::vector<std::byte> pending;  // the start of a part that isn't complete
   std::optional<Header> header;
-  std::optional<std::vector<Chunk>> chunks;  // once the table has come
+  std::optional<std::vector<Chunk>> chunks;  // set once the table has arrived
   std::size_t decoded = 0;                   // the number of chunks decoded so far
   bool isComplete = false;
   Vdi vdi;

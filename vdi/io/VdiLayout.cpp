@@ -155,7 +155,7 @@ Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes) {
 std::optional<Coloring> parseMetadata(const Header& header, std::span<const std::byte> bytes) {
   if (header.version != metadataVersion) return std::nullopt;
   MetadataHeader head{};
-  std::memcpy(&head, bytes.data(), sizeof(MetadataHeader));  // parseHeader has checked that it is there
+  std::memcpy(&head, bytes.data(), sizeof(MetadataHeader));  // parseHeader has checked its presence
   const std::span<const std::byte> text = bytes.subspan(sizeof(MetadataHeader));
   if (head.kind != kindJson) fail("its metadata aren't JSON");
   if (head.bytes != text.size()) {

@@ -7,7 +7,7 @@
 
 namespace vdi::page {
 
-/// The same VDI as a .vdi file whose chunks aren't compressed: LZ4 blocks of literals alone, with new
+/// The same VDI as a .vdi file whose chunks aren't compressed: LZ4 blocks of only literals, with new
 /// checksums. This file is larger than the original, but smaller after deflate than the original would be.
 /// Throws Error{Format} for what io::decode refuses.
 std::vector<std::byte> withPlainChunks(std::span<const std::byte> file);

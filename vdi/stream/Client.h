@@ -50,7 +50,7 @@ class Client {
   struct Standing {
     bool isConnected = false;                     // and welcomed by the server
     std::string session;                          // of the last connection
-    State state;                                  // what the server said last
+    State state;                                  // the last that the server sent
     bool hasState = false;                        // the last connection has sent `state`, after its series
     bool hasBeenLive = false;                     // in the session; false for a finished series
     std::optional<std::size_t> series;            // frames in it

@@ -144,7 +144,7 @@ def _load():
 
 
 def _as_pairs(array):
-    """Complex numbers as their real and imaginary parts, along one axis more; other arrays as they are."""
+    """Complex numbers as their real and imaginary parts, along an additional axis; other arrays unchanged."""
     if array is None or array.dtype.kind != "c":
         return array
     part = array.real
