@@ -71,7 +71,7 @@ export class Live {
     this.state = "connecting";
     /** The reason for being lost or refused, in one line. */
     this.cause = "";
-    /** Why the connected server gets no frames: a relay may have lost its source. */
+    /** The reason why the connected server gets no frames: a relay may have lost its source. */
     this.trouble = "";
     /** Whether this connection's server has been live. A finished series never is. */
     this.hasBeenLive = false;
@@ -89,7 +89,7 @@ export class Live {
     this.viewers = 0;
     /** @type {Steering | null} null: the server has sent none */
     this.steering = null;
-    /** Why the server rejected this viewer's last wish; empty if it didn't. */
+    /** The reason why the server rejected this viewer's last wish; empty if it didn't. */
     this.denied = "";
     /** @type {Arrived | undefined} the level on show; during a pause it may be a former session's */
     this.shown = undefined;

@@ -1,5 +1,5 @@
-// The page's decoder on sound, damaged and hostile files: it decodes, or throws FormatError. $1: vdi.
-// VDI_FUZZ_SECONDS=600 goes on with other damage for so long.
+// The page's decoder on sound, damaged and hostile files: it decodes, or throws FormatError. $1:
+// vdi. With VDI_FUZZ_SECONDS=600, it goes on with other damage for that time.
 import {execFileSync} from "node:child_process";
 import {mkdtempSync, readFileSync, rmSync} from "node:fs";
 import {tmpdir} from "node:os";
@@ -167,7 +167,7 @@ async function testMetadata(/** @type {Uint8Array} */ file) {
   }
 }
 
-/** Lists of as many supersegments as a run may have: more than a byte counts. */
+/** Lists of as many supersegments as a run may have: more than fit a byte. */
 async function testDeepLists() {
   const file = join(folder, "deep.vdi");
   execFileSync(vdi, ["generate", "--field", "shells", "--size", "8x8x16", "--copies", "1x1x40", "--joint", "cells",

@@ -1,5 +1,5 @@
-"""A live page in Chromium before a real server: frames that appear, a server that is killed and comes back, wrong tokens,
-several pages, a series. Waits have no upper bound but the test's own; nothing here measures time."""
+"""A live page in Chromium, connected to a real server: frames that appear, a server that is killed and comes back,
+wrong tokens, several pages, a series. Waits have no upper bound but the test's own; nothing here measures time."""
 import gzip
 import json
 import os
@@ -10,7 +10,7 @@ import urllib.request
 from pagetest import HEIGHT, VDI, WIDTH, azimuth, bare, camera_of, check, compare, message_of, rendered, run, shown, vdi, whole
 
 TOKEN = "a-token-of-this-test-0123456789abcdef"
-SECONDS = 60  # that something may take on a busy machine
+SECONDS = 60  # limit of each wait, on a busy machine
 
 
 class Server:
@@ -75,13 +75,13 @@ def test_frames(browser):
         # A frame that comes while the GPU's context is lost is shown when that is back.
         browser.value("window.context = vdiPage.viewer.renderer.gl.getExtension('WEBGL_lose_context'); context.loseContext()")
         browser.wait("vdiPage.viewer.isLost", SECONDS)
-        check("lost" in message_of(browser), "a lost context is told of")
+        check("lost" in message_of(browser), "a lost context is reported")
         make("run/step_2.vdi", 3)
         wait_for_frame(browser, 2)
         browser.value("vdiPage.setCamera({...vdiPage.viewer.camera}, false); context.restoreContext()")
         browser.wait("!vdiPage.viewer.isLost", SECONDS)
         compare("live, after a lost context", shown(browser), rendered("run/step_2.vdi", turned))
-        check(message_of(browser) == "", "the message of a lost context goes")
+        check(message_of(browser) == "", "the message of a lost context disappears")
 
         browser.send("Page.reload")
         wait_for_frame(browser, 2)
@@ -109,7 +109,7 @@ def test_frames(browser):
         with Server("run", port=server.port):
             wait_for_frame(browser, 4)
             compare("live, after a new start", shown(browser), rendered("run/step_4.vdi", turned))
-        # Refused connections are the browser's to tell of; the page itself throws nothing.
+        # The browser reports refused connections; the page itself throws nothing.
         complaints = [text for text in browser.complaints() if "WebSocket" not in text and "ERR_CONNECTION" not in text]
         check(not complaints, f"live: {complaints}")
 
@@ -188,7 +188,7 @@ def test_series(browser):
 
 
 def test_missing_frame(browser):
-    """A series one of whose files is deleted before anybody asks for it plays on without that frame."""
+    """A series plays on without a frame whose file is deleted before anybody asks for it."""
     for i in range(3):
         make(f"gap_{i}.vdi", 20 + i, large=False)
     with Server("gap_0.vdi", "gap_1.vdi", "gap_2.vdi") as server:
@@ -206,12 +206,12 @@ def test_missing_frame(browser):
             browser.wait(f"vdiPage.frame === {i}", SECONDS)
         check(browser.value("vdiPage.isPlaying"), "a missing frame doesn't stop a series")
         lines = browser.value("lines")
-        check(any("frame 2: the file is damaged or gone" in text for text in lines), f"the line tells of it: {lines}")
+        check(any("frame 2: the file is damaged or gone" in text for text in lines), f"the line reports it: {lines}")
         browser.key(" ")
         whole(browser)
 
 
-# A connection whose messages of steering are this test's: vdi serve has nothing to steer.
+# A connection whose steering messages come from this test, because vdi serve has nothing to steer.
 STEERED = """
 class Steered extends WebSocket {
   constructor(...words) { super(...words); window.wire = this; this.asked = []; }
@@ -279,7 +279,7 @@ def test_steering(browser):
             browser.value("new Promise((done) => setTimeout(done, 400))")
             return asked()
 
-        check(rest_at(near) == [], "nothing is asked for unless somebody says so")
+        check(rest_at(near) == [], "nothing is requested unless Auto is on")
         browser.value("document.getElementById('newview').click()")
         wish = asked()[0]
         check(wish["camera"]["position"] == near["position"] and wish["camera"]["viewAngle"] == near["viewAngle"], f"{wish}")

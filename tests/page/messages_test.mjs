@@ -1,6 +1,6 @@
-// The page's end of the stream on sound, damaged and hostile messages, without a network. These go to the
-// decoder of messages, or to a connection over sockets that are objects of this test. VDI_FUZZ_SECONDS=600 goes on with
-// other damage for so long.
+// The page's end of the stream on sound, damaged and hostile messages, without a network. The
+// messages go to the decoder of messages, or to a connection over this test's fake sockets. With
+// VDI_FUZZ_SECONDS=600, it goes on with other damage for that time.
 import {setFlagsFromString} from "node:v8";
 import {runInNewContext} from "node:vm";
 
@@ -60,7 +60,7 @@ function testTexts() {
   check(series.pulse === 0 && serverMessageOf(JSON.stringify({...welcome, pulse: 15})).pulse === 15, "a server's pulse");
   check(serverMessageOf('{"type":"driver","you":true}').type === "other", "a kind that the page has no use for");
   const told = serverMessageOf(JSON.stringify(steering));
-  check(JSON.stringify(told) === JSON.stringify(steering), "how steering stands");
+  check(JSON.stringify(told) === JSON.stringify(steering), "the state of steering");
   check(serverMessageOf(JSON.stringify({...steering, driver: 7, generator: null})).driver === 7, "somebody drives");
   const many = serverMessageOf(JSON.stringify({...steering, generator: {...steering.generator, supersegments: 1024}}));
   check(many.type === "steering" && many.generator?.supersegments === 1024, "as many supersegments as a run may have");
@@ -132,7 +132,7 @@ function testParts() {
         check(outcome(() => assembler.add(damaged)) === "refused", `damage ${kind} is taken`);
       }
       got = assembler.add(sound);
-      check(assembler.room.length <= Math.max(2 * end, 1 << 20), "room for more than has come");
+      check(assembler.room.length <= Math.max(2 * end, 1 << 20), "a buffer larger than the received bytes allow");
       at = end;
     }
     check(got?.length === bytes && got.every((byte, i) => byte === file[i]), `a level of ${bytes} bytes`);
@@ -149,7 +149,7 @@ function testParts() {
   check(assembler.room.length <= 1 << 20, "a level that is only announced takes no memory");
 }
 
-/** A socket that records, and gives what it's told to. */
+/** A socket that records messages, and delivers the test's. */
 class FakeSocket {
   constructor() {
     /** @type {any[]} */
@@ -217,7 +217,7 @@ async function testConnection() {
   const ends = sockets[0].sent.filter((m) => m.type === "ack");
   check(ends.length === 2 && ends[1].frame === 7 && ends[1].level === 1 && ends[1].bytes === 4, "acknowledgements of levels' ends");
 
-  // Newest wins: of levels that come while one is decoded, the last.
+  // Of the levels that arrive while one is decoded, only the newest is shown.
   for (let i = 3; i < 9; ++i) sendLevel(sockets[0], 8 + i, 0, i);
   await soon(60);
   check(shown.join() === "1,2,3,8", `newest wins: ${shown}`);
@@ -235,7 +235,7 @@ async function testConnection() {
   const acks = sockets[0].sent.filter((m) => m.type === "ack" && m.frame === 32).map((m) => m.bytes);
   check(acks.join() === [1, 2, 3, 4].map((i) => i << 19).join(), `an acknowledgement each 512 KiB: ${acks}`);
 
-  // The server goes, comes back as the same, and as another one.
+  // The server disappears, comes back as the same one, and then as another.
   sockets[0].end(1006);
   check(live.state === "lost" && live.retryAt > 0, "a lost connection");
   await soon(700);
@@ -269,10 +269,10 @@ async function testConnection() {
   check(live.state === "lost", "noise");
   live.close();
   await soon(1500);
-  check(sockets.length === 5 && live.state === "closed", "what was closed stays closed");
+  check(sockets.length === 5 && live.state === "closed", "a closed connection stays closed");
 }
 
-/** A line that was cut in the middle reports nothing. The page notices the silence. */
+/** A connection that breaks silently reports nothing. The page notices the silence. */
 async function testSilence() {
   const pulse = 0.1;
   const {live, sockets} = connection();
@@ -291,7 +291,7 @@ async function testSilence() {
   await soon(300);
   check(live.state === "live", "a message that comes before the second look");
   await soon(450);
-  check(live.state === "lost" && live.cause === "the server doesn't answer", `a line that is cut: ${live.state}`);
+  check(live.state === "lost" && live.cause === "the server doesn't answer", `a connection that breaks: ${live.state}`);
   await soon(500);
   sockets[1].open();
   sockets[1].text({...welcome, series: null});
@@ -300,7 +300,7 @@ async function testSilence() {
   live.close();
 }
 
-/** The decoder takes a level late, amid the next one: acknowledgements of that one go on. */
+/** The decoder takes a level late, while the next one arrives. Acknowledgements of the next one go on. */
 async function testLateDecoder() {
   const {live, sockets} = connection(50);
   sockets[0].open();
@@ -555,7 +555,7 @@ async function testLostSource() {
   live.close();
 }
 
-/** What a request for a frame of a series comes to: it ends, whatever becomes of the frame. */
+/** A request for a frame of a series ends, whatever becomes of the frame. */
 async function testMissingFrames() {
   const {panel, live, sockets} = panelOf();
   sockets[0].open();

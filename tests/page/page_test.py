@@ -1,5 +1,5 @@
-"""The exported page in Chromium against vdi render, by real input events, and what bad input gets. With the argument speed
-it measures how long a view takes instead."""
+"""Compares the exported page in Chromium with vdi render, by real input events, and tests bad input. With the
+argument speed it measures how long a view takes instead."""
 import base64
 import io
 import json
@@ -61,7 +61,7 @@ def angle_of(browser):
 
 
 def check_culling(browser):
-    """Culled regions show nothing: views from anywhere, the scene's inside included, are those without culling."""
+    """Culled regions show nothing: views from anywhere, also from inside the scene, equal those without culling."""
     browser.value("""window.both = (camera, scale) => {
       const {renderer} = vdiPage.viewer, {gl} = renderer;
       const {width, height} = renderer.pictureSize(scale), half = Math.floor(height / 2);
@@ -119,7 +119,7 @@ def test_culling_parallel(browser):
 
 
 def test_hands(browser):
-    views = []  # vdi render makes the expected pictures while the hand moves on
+    views = []  # vdi render makes the expected pictures while the test goes on
 
     def look(what):
         expected = rendering("compact.vdi", camera_of(browser))
@@ -296,7 +296,7 @@ def test_series(browser):
 
 
 def check_quick_clicks(browser):
-    """Play, and once a frame is on show Pause and Play at once: the first loop ends, and the second one plays on."""
+    """Presses Play, and once a frame is on show, Pause and Play: the first loop ends, and the second one plays on."""
     played = browser.value("""(async () => {
       const page = vdiPage, button = document.getElementById('play'), first = page.frame;
       const asked = [];

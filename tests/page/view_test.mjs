@@ -1,5 +1,5 @@
-// What the page does with hands, pictures and numbers, without a browser: elements, renderer and clock are
-// this test's.
+// Tests the page's controls, pictures and numbers without a browser. The test provides elements,
+// renderer and clock.
 import {basisOf, cameraOfText, cameraText, clipMatrix, halfHeightOf, orbited, panned, toView, zoomed} from "../../web/camera.js";
 import {addControls} from "../../web/controls.js";
 import {numberText} from "../../web/legend.js";
@@ -135,7 +135,7 @@ async function testScreenshot() {
   check(refused.includes("lost the picture"), `no screenshot of a lost picture: ${refused}`);
 }
 
-/** An element of this size, hands on it, and where the camera sees a point of the world. */
+/** An element of this size, pointers on it, and the place where the camera sees a point of the world. */
 function handsOn(/** @type {number} */ width, /** @type {number} */ height, /** @type {number} */ framed) {
   /** @type {Map<string, (event: any) => void>} */
   const listeners = new Map();
@@ -173,7 +173,8 @@ function testRoll() {
   mouse.point("pointermove", 1, 200, 70);
   check(isNear(mouse.place(beside), 200, 70), `a mouse rolls material along: ${mouse.place(beside)}`);
 
-  // Fingers on both sides of the middle, which turn counterclockwise by turns and by little.
+  // Fingers on both sides of the middle, which move alternately, counterclockwise and a little at a
+  // time.
   const touch = handsOn(400, 300, 1);
   touch.point("pointerdown", 1, 280, 150);
   touch.point("pointerdown", 2, 120, 150);
@@ -271,7 +272,7 @@ function testNumbers() {
   for (const [got, expected] of cases) check(got === expected, `numbers: ${got}, not ${expected}`);
 }
 
-/** A page of fields without a browser: a field shows what it is set to, and `enter` is a user who types and leaves it. */
+/** A page of fields without a browser. `enter` acts as a user who types in a field and leaves it. */
 function fields() {
   /** @type {Map<string, any>} */
   const elements = new Map();
@@ -302,7 +303,7 @@ function fields() {
   return {byId, enter, leave: () => page.activeElement = null};
 }
 
-/** A steering panel, what it asks for, and how the server's state reaches it. */
+/** A steering panel, its requests, and a function that delivers the server's state. */
 function steered() {
   const page = fields();
   /** @type {any[]} */
