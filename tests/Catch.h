@@ -1,6 +1,6 @@
 #pragma once
-// Catch2, whose headers and some of whose names differ between versions 2 and 3. CMakeLists.txt has what
-// differs on its command line.
+// Catch2, whose headers and some names differ between versions 2 and 3. CMakeLists.txt covers the differences
+// on its command line.
 
 #if __has_include(<catch2/catch_all.hpp>)
 #include <catch2/catch_approx.hpp>
@@ -22,7 +22,7 @@ namespace vdi::test {
 #if __has_include(<catch2/catch_all.hpp>)
 using Catch::Matchers::ContainsSubstring;
 #else
-/// Matches texts that contain this one; version 3's name.
+/// Matches texts that contain `part`, by the name that version 3 has.
 inline auto ContainsSubstring(const std::string& part) {  // NOLINT(readability-identifier-naming)
   return Catch::Matchers::Contains(part);
 }

@@ -4,8 +4,8 @@ cmake_minimum_required(VERSION 3.25)
 set(errors "")
 set(folders "")
 
-# allow(<folder> <others>...): a file of this folder may include headers of the folder itself, of these others,
-# and of the folders that the others may include. The others come before it, so the lists hold no circle.
+# allow(<folder> <others>...): a file of this folder may include headers of the folder itself, of these others, and of
+# the folders that the others may include. The others come before it, so the lists have no cycles.
 function(allow folder)
   set(allowed "${folder}")
   foreach(other IN LISTS ARGN)

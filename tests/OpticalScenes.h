@@ -1,4 +1,4 @@
-// Volumes and transfer functions for what is held against the optical model in double precision
+// Volumes and transfer functions for comparisons with the optical model in double precision
 // (vdi/reference/Exact.h).
 #pragma once
 
@@ -16,14 +16,14 @@
 
 namespace vdi::test {
 
-/// Rises and falls along each ray, from 0 to 1.
+/// A field that rises and falls along each ray, from 0 to 1.
 inline double waves(const glm::dvec3& p) {
   const double sum = std::sin(5.5 * p.x + 2.0 * p.y) + std::cos(4.5 * p.z - 3.0 * p.y) +
                      0.8 * std::sin(4.0 * p.y + 3.0 * p.z + 1.5 * p.x);
   return std::clamp(0.5 + sum / 5.6, 0.0, 1.0);
 }
 
-/// The scalars that a type's [0, 1] is stretched over.
+/// The range of scalars over which [0, 1] is stretched, for a type.
 struct Stretch {
   ScalarType type;
   double low;
@@ -171,7 +171,7 @@ inline float mostOpaque(const Image& image) {
   return most;
 }
 
-/// Looks at the scene's middle; no ray runs along a face or through an edge.
+/// A camera that looks at the scene's middle, and whose rays run along no face and through no edge.
 inline Camera lookingAt(bool parallel) {
   Camera camera;
   camera.focalPoint = {0.49, 0.43, 0.46};

@@ -15,7 +15,7 @@ namespace vdi::test {
 inline constexpr Reconstruction reconstructions[] = {Reconstruction::Sheared, Reconstruction::Smooth,
                                                      Reconstruction::Constant};
 
-/// Low and high values of the scalar type that a field's [0, 1] is stretched over.
+/// The scalar that represents a field's 1, for a type; 0 represents 0.
 inline double topOf(ScalarType type) {
   return sizeOf(type) == 1 ? 100.0 : type == ScalarType::F32 ? 1.0 : 1000.0;
 }
@@ -83,7 +83,7 @@ inline GenerateSettings smallSettings(int width = 64, int height = 48, std::uint
   return settings;
 }
 
-/// Looks at the unit cube from an oblique direction.
+/// A camera that looks at the unit cube from an oblique direction.
 inline Camera oblique(bool parallel = false) {
   Camera camera = Camera::framing({glm::dvec3(0.0), glm::dvec3(1.0)}, {-0.5, -0.35, -1.0}, {0.0, 1.0, 0.0});
   camera.parallelProjection = parallel;

@@ -11,7 +11,8 @@
 
 namespace vdi::test {
 
-/// The code and the text of an exception; no code if there was none. One that is no Error has code Io.
+/// The code and the text of an exception; no code if there was none. An exception that isn't an Error has
+/// code Io.
 struct Thrown {
   std::optional<ErrorCode> code;
   std::string text;

@@ -8,7 +8,7 @@ source "$(dirname "$0")/works.sh"
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 cd "$folder" || exit 1
-# compared <what> <condition on c> <options of compare...>: c, what vdi compare says of two pictures, meets the condition.
+# compared <what> <condition on c> <options of compare...>: c, the output of vdi compare, meets the condition.
 compared() {
   local what=$1 condition=$2
   shift 2
@@ -34,10 +34,10 @@ cmp three.vdi three_written.vdi || fail "on 3 ranks the written file isn't the g
 refused 1 "no-such-folder" "${mpirun[@]}" 2 "$vdi" generate --field sphere "${small[@]}" -o no-such-folder/x.vdi
 refused 1 "No space" "${mpirun[@]}" 2 "$vdi" generate --field sphere "${small[@]}" -o /dev/full
 works "info" "$vdi" info one.vdi
-grep -q "80 x 60" out.txt || fail "info doesn't tell the resolution"
-grep -q "compact precision" out.txt || fail "info doesn't tell the precision"
-grep -q "array .* of \(points\|cells\), from " out.txt || fail "info doesn't tell array and range"
-grep -q "opacity .* nodes from .*, unit distance " out.txt || fail "info doesn't tell the opacity function"
+grep -q "80 x 60" out.txt || fail "info doesn't print the resolution"
+grep -q "compact precision" out.txt || fail "info doesn't print the precision"
+grep -q "array .* of \(points\|cells\), from " out.txt || fail "info doesn't print array and range"
+grep -q "opacity .* nodes from .*, unit distance " out.txt || fail "info doesn't print the opacity function"
 works "full precision" "$vdi" generate --field turbulence "${small[@]}" --joint cells --precision full -o full.vdi --flat full.png
 compared "compact isn't full's picture" "c['max_error'] <= 1" one.png full.png
 [ $((2 * $(stat -c %s one.vdi))) -lt "$(stat -c %s full.vdi)" ] || fail "compact is no smaller"
@@ -47,8 +47,8 @@ compared "constant isn't like smooth" "0.9 < c['ssim'] < 1" turned.png constant.
 refused 2 "reconstruction" "$vdi" render full.vdi -o x.png --reconstruction cubic
 works "total budget" "$vdi" generate --field mixing "${small[@]}" --budget total --fill 0.5 -o need.vdi --flat need.png --dvr need_dvr.png
 works "equal budget" "$vdi" generate --field mixing "${small[@]}" -o equal.vdi
-[ $((10 * $(stat -c %s need.vdi))) -lt $((8 * $(stat -c %s equal.vdi))) ] || fail "half of the supersegments are no smaller"
-compared "a total budget isn't true at V_O" "c['max_error'] <= 1" need.png need_dvr.png
+[ $((10 * $(stat -c %s need.vdi))) -lt $((8 * $(stat -c %s equal.vdi))) ] || fail "the file with half of the supersegments is no smaller"
+compared "with a total budget, V_O's picture differs" "c['max_error'] <= 1" need.png need_dvr.png
 refused 2 "merge" "$vdi" generate --field sphere "${small[@]}" --budget total --algorithm bisection -o x.vdi
 refused 2 "fill" "$vdi" generate --field sphere "${small[@]}" --fill 0.5 -o x.vdi
 refused 2 "budget" "$vdi" generate --field sphere "${small[@]}" --budget each -o x.vdi
@@ -85,14 +85,14 @@ cmp page.html again.html || fail "a page that can't be made replaces the old one
 refused 1 "No space" "$vdi" export one.vdi -o /dev/full
 refused 2 "overwrite" "$vdi" export one.vdi -o one.vdi
 refused 2 "required" "$vdi" export -o page.html
-# Lists beyond the picture's edges: the picture stays, and what turning brings into view is there. At higher rates, rays
-# that are set up from another pixel round differently, and a pixel may be off by 1/255.
+# Lists beyond the picture's edges leave the picture as it is, and show what turning brings into view. At higher rates,
+# rays that are set up from another pixel round differently, and a pixel may be off by 1/255.
 near=(--field turbulence "${small[@]}" --zoom 4 --sampling-rate 1)
 works "generate" "$vdi" generate "${near[@]}" -o cut.vdi --flat cut.png
 works "generate with a margin" "$vdi" generate "${near[@]}" --margin 1 -o kept.vdi --flat kept.png
 cmp cut.png kept.png || fail "a margin changes the picture"
 works "info" "$vdi" info kept.vdi
-grep -q "picture *80 x 60, and a margin of" out.txt || fail "info doesn't tell the margin"
+grep -q "picture *80 x 60, and a margin of" out.txt || fail "info doesn't print the margin"
 works "render" "$vdi" render kept.vdi -o kept_again.png
 compared "not the picture's own view" "c['max_error'] <= 2" kept.png kept_again.png
 refused 2 "margin" "$vdi" generate "${near[@]}" --margin 5 -o x.vdi
@@ -175,7 +175,7 @@ works "info" "$vdi" info steps_0008.vdi
 grep -q "of points, from 0 to 4000" out.txt || { fail "a big-endian volume behind a header has other values"; cat out.txt; }
 works "info" "$vdi" info steps_0009.vdi
 if ! grep -q "step 9" out.txt || ! grep -q "0.75" out.txt; then
-  fail "info doesn't tell step and time"
+  fail "info doesn't print step and time"
   cat out.txt
 fi
 cp v.json $'\xff.json'
@@ -197,7 +197,7 @@ pictures=(left_*)
 [ ${#pictures[@]} -eq 3 ] || fail "a broken series has other pictures"
 works "a late step" "$vdi" generate --raw s0.json s1.json --resolution 40x30 --step 4294967301 -o late.vdi
 works "info" "$vdi" info late_4294967302.vdi
-grep -q "step 4294967302" out.txt || fail "a late step isn't itself"
+grep -q "step 4294967302" out.txt || fail "a step has lost its large number"
 refused 2 "step.*whole" "$vdi" generate --field sphere "${small[@]}" --step=-1 -o x.vdi
 refused 2 "step.*whole" "$vdi" generate --field sphere "${small[@]}" --step 18446744073709551616 -o x.vdi
 refused 2 "exceeds" "$vdi" generate --raw s0.json s1.json --step 18446744073709551615 -o x.vdi
@@ -206,7 +206,7 @@ refused 2 "finite" "$vdi" generate --field sphere "${small[@]}" --time nan -o x.
 # Each viewpoint that can't show the VDI truly gets one warning.
 warnings() { grep -c "warning.*$1" err.txt; }
 works "no warning" "$vdi" render one.vdi -o x.png --azimuth -50 0 50
-[ ! -s err.txt ] || { fail "a viewpoint near V_O is warned of"; cat err.txt; }
+[ ! -s err.txt ] || { fail "there is a warning of a viewpoint near V_O"; cat err.txt; }
 works "far beside" "$vdi" render one.vdi -o x.png --azimuth 90 180 --reconstruction constant
 [ "$(warnings degrees)" -eq 1 ] || { fail "far beside: no warning, or several"; cat err.txt; }
 works "inside" "$vdi" render one.vdi -o x.png --position 0.5 0.4 0.4 --focal-point 0 0 0
@@ -270,21 +270,21 @@ head -c 200 one.vdi >short.vdi
 refused 1 "short.vdi" "$vdi" render short.vdi -o x.png
 refused 1 "v.json" "$vdi" info v.json
 works "check" "$vdi" check '{"field": "V", "every": 10}'
-grep -q "steps 0, 10, 20" out.txt || fail "check doesn't tell the steps"
-grep -q "vdi_000010.vdi" out.txt || fail "check doesn't tell the files"
+grep -q "steps 0, 10, 20" out.txt || fail "check doesn't print the steps"
+grep -q "vdi_000010.vdi" out.txt || fail "check doesn't print the files"
 printf '{"field": "V",\n"camera": {"position": [0, 0]}}' >run.json
 refused 1 "/camera/position: must be an array of 3 numbers .run.json, line 2." "$vdi" check run.json
 works "check" "$vdi" check '{"field": "V", "log": "logs/run.jsonl"}'
-grep -q "^log: logs/run.jsonl" out.txt || fail "check doesn't tell the log"
+grep -q "^log: logs/run.jsonl" out.txt || fail "check doesn't print the log"
 mkdir -p there
 cp one.vdi there/vdi_000003.vdi
 run='{"field": "V", "every_time": 0.5, "every_seconds": 9, "when": {"max": "p", "above": 2}, "max_share": 0.05,
   "cameras": [{"name": "a", "orbit": {}}, {"name": "b", "orbit": {}}], "output": "there/vdi_{timestep:06d}.vdi"'
 works "check" "$vdi" check "$run}"
 grep -q "every 0.5 of the simulation's time and every 9 s, if p's maximum is above 2, in at most 5 % of the wall" out.txt ||
-  fail "check doesn't tell when frames are made"
+  fail "check doesn't print when frames are made"
 works "check" "$vdi" check '{"field": "V", "output": "there/vdi_{timestep:06d}.vdi"}'
-grep -q "there/vdi_000003.vdi exists already" out.txt || fail "check doesn't tell what is in the way"
+grep -q "there/vdi_000003.vdi exists already" out.txt || fail "check doesn't print what is in the way"
 printf '{"field": "V",\n"when": {"max": "V"}}' >run.json
 refused 1 "/when: must have a bound, 'above' or 'below' .run.json, line 2." "$vdi" check run.json
 refused 1 "not a run's log .*odd.json" "$vdi" log odd.json

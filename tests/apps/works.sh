@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Checks of what commands do. A test sources this file and ends with: exit $((failures > 0)). The output of the last command
-# is in out.txt and err.txt.
+# Checks of commands. A test sources this file and ends with: exit $((failures > 0)). The output of the last command is
+# in out.txt and err.txt.
 failures=0
 
 fail() {
@@ -13,7 +13,7 @@ works() {
   shift
   "$@" >out.txt 2>err.txt || { fail "$what: status $?"; cat out.txt err.txt; }
 }
-# says <pattern> command...: what err.txt has of the command.
+# says <pattern> command...: a line that the command writes to standard error.
 says() {
   local pattern=$1
   shift

@@ -56,7 +56,7 @@ struct Slab {
   vdi_catalyst_block block{};
 };
 
-/// A polynomial in a point's place.
+/// A polynomial in a point's coordinates.
 double at(double x, double y, double z) {
   return 3.0 + x + 2.0 * y + 4.0 * z;
 }

@@ -115,7 +115,7 @@ TEST_CASE("fields arrive: strides, offsets, blocks that lack an array, particles
   }
   CHECK((stars.weight_stride == 0 && numberAt<double>(stars.weights, 0) == 2.5));
   CHECK(stars.lengths == nullptr);
-  // The engine takes them as a simulation's.
+  // The engine accepts them like a simulation's.
   CHECK_NOTHROW(particleArrayOf(&stars));
 
   REQUIRE(got.parameters.size() == 1);

@@ -48,7 +48,7 @@ void* allocatedOrThrown(std::size_t bytes, const void* caller) {
 
 }  // namespace
 
-// The engines, which are loaded later, take these, because the program comes first.
+// The engines, which are loaded later, use these operators, because the program's symbols come first.
 void* operator new(std::size_t bytes) {
   return allocatedOrThrown(bytes, __builtin_return_address(0));
 }
@@ -144,7 +144,7 @@ int execute() {
     if (rank != 0 || isIsolated) break;
     if (script != nullptr && std::string_view(end) == ".png") break;
     const bool isThere = std::filesystem::remove("step_" + number + end);
-    expect(isThere || code != VDI_CATALYST_OK, "execute", step, "a file is missing in silence");
+    expect(isThere || code != VDI_CATALYST_OK, "execute", step, "a file is missing without an error");
   }
   return code;
 }

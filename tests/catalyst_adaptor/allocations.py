@@ -1,4 +1,4 @@
-"""One small VDI a step, for allocations.cpp."""
+"""One small VDI per step, for allocations.cpp."""
 
 from paraview import catalyst
 from paraview.simple import *  # noqa: F403

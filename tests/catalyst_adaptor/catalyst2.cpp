@@ -73,7 +73,7 @@ Layout layoutOf(const std::string& name) {
     return &layout.pieces.back();
   };
   const double fine = 1.0 / fineCells;
-  if (name == "mesh") {  // a slab of each rank
+  if (name == "mesh") {  // one slab per rank
     const int first = rank * fineCells / ranks;
     add({first, 0, 0}, {(rank + 1) * fineCells / ranks - first, fineCells, fineCells}, fine, 0);
   } else if (name == "multimesh") {  // bricks with ghost layers inside the cube; the third rank has none
@@ -252,7 +252,7 @@ void describe(const Layout& layout, std::size_t number, Piece& piece, Node& mesh
   }
 }
 
-/// A rank's step, as the protocol of ParaView's implementation has it.
+/// A rank's step in the form that ParaView's implementation defines.
 Node stepNode(Layout& layout, int step) {
   Node node;
   node["catalyst/state/timestep"].set(step);
@@ -314,7 +314,7 @@ void finalize() {
   expect("a step after it", 100, execute(node));
 }
 
-/// Arrays of each type, of which the script knows the values, one that the first rank alone has, and one of
+/// Adds arrays of each type, whose values the script knows, one that only the first rank has, and one with
 /// too many components.
 void addTypes(Node& mesh, std::size_t cells) {
   const auto add = [&](const std::string& name, auto zero) {
@@ -361,7 +361,7 @@ void runCatalyst(Layout& layout, const std::string& run, const std::vector<std::
   finalize();
 }
 
-// --- What can't be taken.
+// --- Faulty input.
 
 void refuseToStart(const std::string& what, const std::function<void(Node&)>& spoil) {
   Node node;

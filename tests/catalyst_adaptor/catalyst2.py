@@ -80,7 +80,7 @@ def bad(*program):
 
 
 def lost(die_at, *program):
-    """Processes that make frames and die cost all steps from then on, and one line."""
+    """If the processes that make frames die, all later steps fail, and one line says so."""
     says = run("catalyst2_lost", *program, "lost", json.dumps(dict(RUN, every=1, isolation="process")),
                LD_PRELOAD=die_at + ":libvulkan.so.1", VDI_TEST_DIE="taking:0:kill")
     lines = [line for line in says.splitlines() if line.startswith("vdi_catalyst: ")]

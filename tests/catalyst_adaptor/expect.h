@@ -1,4 +1,4 @@
-/* What the simulations in C share: their begin and end, and checks of the codes that the adaptor's calls
+/* Shared by the simulations in C: their begin and end, and checks of the codes that the adaptor's calls
  * return, isolated runs included. */
 #ifndef VDI_TESTS_CATALYST_EXPECT_H
 #define VDI_TESTS_CATALYST_EXPECT_H
@@ -42,7 +42,7 @@ static inline int initialize_any(const char* what, vdi_catalyst** catalyst) {
                          : vdi_catalyst_initialize_json(comm, what, catalyst);
 }
 
-/* The memory of this process. */
+/* The resident memory of this process, in KiB. */
 static inline long resident_kib(void) {
   long pages = 0;
   FILE* file = fopen("/proc/self/statm", "r");
@@ -58,7 +58,7 @@ static inline int expect(int rank, const char* what, int wanted, int code) {
   return 1;
 }
 
-/* In processes of their own, frames are made later. The code of one that failed comes from a later call. */
+/* Frames in separate processes are made later. A later call returns the code of a frame that failed. */
 static int is_late;
 static int has_failed; /* a frame was to fail */
 static int is_untold;  /* and no later call has returned that */

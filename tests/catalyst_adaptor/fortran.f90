@@ -1,4 +1,4 @@
-! A simulation in Fortran: one block a rank, point data, two steps. Its argument is the script.
+! A simulation in Fortran: one block per rank, point data, two steps. Its argument is the script.
 program fortran_simulation
   use, intrinsic :: iso_c_binding
   use mpi

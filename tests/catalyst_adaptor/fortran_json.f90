@@ -1,4 +1,4 @@
-! A simulation in Fortran without a script: one block a rank, a VDI every 2 steps.
+! A simulation in Fortran without a script: one block per rank, a VDI every 2 steps.
 program fortran_json
   use, intrinsic :: iso_c_binding
   use mpi

@@ -132,7 +132,7 @@ def restart():
     assert len(told) == 1 and re.search("was killed by signal 9 .*; it starts again for the next frame", told[0]), told
     assert run.codes.count(ENGINE) == 1 and set(run.codes) == {0, ENGINE} and run.end == 0, run.codes
     assert not os.path.exists("once")
-    # Frames that the simulation didn't wait for aren't told as its wait.
+    # Frames that the simulation didn't wait for aren't reported as its wait.
     records = [json.loads(line) for line in open("run.jsonl")]
     starts = [record for record in records if record["event"] == "start"]
     assert len(starts) == 2 and all(start["isolated"] for start in starts) and records[-1]["isolated"], records
@@ -142,7 +142,7 @@ def restart():
 
 
 def stopped():
-    """Steps are left out while it is stopped, and the simulation goes on. The cause is told, whichever rank's it is."""
+    """Steps are left out while it is stopped, and the simulation goes on. The cause is reported, whichever rank has it."""
     for stage, rank in (("writing", 0), ("taking", LAST)):
         run = Run({"output": stage + "_{timestep}.vdi"}, 10, **dying(stage, "stop", rank=rank))
         first = run.codes.index(SCRIPT)
@@ -155,8 +155,8 @@ def stopped():
 
 
 def slow():
-    """At the end, the simulation waits for each frame that is still made, and without a limit if viewers may steer. The limit
-    is 300 s of a clock that hurries. A frame is made in more than 6 s."""
+    """At the end, the simulation waits for each frame that is still being made, and without a limit if viewers may steer. The
+    limit is 300 s of a clock that hurries. A frame is made in more than 6 s."""
     slowly = dying("writing", "sleep", rank=0)
     run = Run({"output": "v_{timestep}.vdi"}, 3, VDI_TEST_HURRY="30", **slowly)  # two frames in 12 s, within 10 s each
     assert set(run.codes) == {0} and run.end == 0 and made() == ["v_0.vdi", "v_1.vdi", "v_2.vdi"], made()
@@ -182,7 +182,7 @@ def impatient():
 
 
 def no_room():
-    """A rank that finds no memory to share fails the step on all, and tries the next."""
+    """If a rank finds no memory to share, the step fails on all ranks, and the next one is tried."""
     run = Run({"every": 2}, 6, VDI_TEST_SIZE="64", VDI_TEST_FILE_LIMIT="100000")
     assert run.codes == [SCRIPT, 0, SCRIPT, 0, 0, 0] and run.end == 0 and made() == ["vdi_000004.vdi"], run.codes
     assert "no room for 3 MiB of memory shared with the process" in run.lines[0] and "again" in run.lines[1], run.lines

@@ -1,5 +1,5 @@
-"""Compares the cost of a step, to a simulation whose frames are made in a process of its own, with that of the same step
-without the library: between frames, while a frame is made, and where it hands its values over. Argument: the simulation,
+"""Compares the cost of a step in a simulation whose frames are made in a separate process with that of the same
+step without the library: between frames, while a frame is made, and when values are handed over. Argument: the simulation,
 which runs on one rank.
 
 With two cores or more, the simulation has the first one and the process the others. Prints the ratios of medians. It fails

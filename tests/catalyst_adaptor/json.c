@@ -26,7 +26,7 @@ static double cells[N][N][N];               /* [x][y][z] */
 static int64_t points[N + 1][N + 1][N + 1]; /* [z][y][x] */
 static float vectors[N][N][N][3];           /* [z][y][x] */
 
-/* At step 0 a hump in the middle, which moves along y. */
+/* A hump, which is in the middle at step 0 and moves along y. */
 static double hump(int x, int y, int z, int step) {
   const double dx = x - N / 2.0 + 0.5;
   const double dy = y - N / 2.0 - 0.5 * step;

@@ -17,7 +17,7 @@ for frame in (frames[0], frames[2]):
     stages = frame["stages"]
     assert list(stages) == ["wait", "upload", "generate", "distribute", "composite", "gather", "output"], stages
     assert all(0 <= stage["mean"] <= stage["slowest"] for stage in stages.values()), frame
-    # Another rank than the first one may have waited for longer than the first one needed.
+    # A rank other than the first may have waited for longer than the first one needed.
     assert all(stages[name]["slowest"] <= frame["ms"] for name in stages if name != "wait"), frame
     assert stages["generate"]["mean"] > 0 and stages["output"]["mean"] > 0, stages
     # Two ranks: the slowest one has at most all of what both have.

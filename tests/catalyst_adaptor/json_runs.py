@@ -17,7 +17,7 @@ PRELOADED = "".join(library + ":" for library in os.environ.get("LD_PRELOAD", ""
 
 
 def run(document, *codes, said="", **environment):
-    """Returns what it says. Each step must return its code."""
+    """Returns the simulation's output. Each step must return its code."""
     process = subprocess.run([*simulation, json.dumps({**SMALL, **document}), *(str(code) for code in codes)],
                              env={**os.environ, "VDI_OUTPUT": os.getcwd(), **environment}, capture_output=True, text=True,
                              timeout=PATIENCE)
@@ -52,7 +52,7 @@ def existing():
     assert made() == ["v_0.vdi", "v_2.vdi", "v_4.vdi"], made()
     first = written(made())
     refused(document, "v_0.vdi")
-    # A restart from step 2: it and later ones are made anew, and earlier ones stay.
+    # After a restart from step 2, this and later steps are made anew, and earlier files stay.
     run({**document, "existing": "continue"}, *5 * [0], VDI_TEST_FIRST="2")
     assert made() == ["v_0.vdi", "v_2.vdi", "v_4.vdi", "v_6.vdi"], made()
     again = written(made())
@@ -99,7 +99,7 @@ def conditions():
     means = [sum(one) / len(one) for one in values]
 
     def check(expected, condition, name):
-        wants = dict(VDI_TEST_WANTS="111111")  # the data must tell
+        wants = dict(VDI_TEST_WANTS="111111")  # the data decide
         run({"output": name + "_{timestep}.vdi", "when": condition}, *6 * [0], **wants)
         files = ["%s_%d.vdi" % (name, step) for step in steps if expected(step)]
         assert 0 < len(files) < 6 and [file for file in made() if file.startswith(name + "_")] == files, (files, made())
@@ -193,7 +193,7 @@ def full():
     os.symlink("/dev/full", "o.cdb/data.csv")
     run({"every": 2, "orbit": {}, "output": "o.cdb", "existing": "overwrite"}, 3, 0, said="data.csv")
     assert os.path.getsize("o.cdb/000000.png") > 0
-    # One camera's files that find no room don't keep those of the others away.
+    # If there is no room for one camera's files, those of the others are still written.
     os.symlink("/dev/full", "c_0_a.vdi")
     run({"cameras": [{"name": "a", "orbit": {}}, {"name": "b", "orbit": {"elevation": 9}}], "output": "c_{timestep}.vdi",
          "existing": "overwrite", "log": "run.jsonl"}, 3, 0, said="c_0_a.vdi")

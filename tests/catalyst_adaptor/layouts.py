@@ -32,14 +32,14 @@ def run(field, cells, steps=1, launcher=None, **document):
 
 
 def differences(one, other):
-    """Those between two pictures, of 255."""
+    """The differences between two pictures, in 1/255."""
     one, other = (images.imread(io.BytesIO(picture)).astype(int) for picture in (one, other))
     assert one.max() > 80
     return abs(one - other)
 
 
 def difference(one, other):
-    """The largest one between two pictures, of 255."""
+    """The largest difference between two pictures, in 1/255."""
     return differences(one, other).max()
 
 
@@ -60,7 +60,7 @@ def same():
     # The same function, sampled half a cell beside. With an offset of the wrong sign or axis it would lie a cell away.
     beside = differences(expected[0], alone("staggered")[0]).mean()
     assert 0 < beside < 0.6, beside
-    # A rank that has no array of the name is one whose block lacks it.
+    # A rank without an array of the name counts as one whose block lacks it.
     partial = run("partial", 30)[0]
     assert difference(expected[0], partial[0]) > 20
     assert run("elsewhere", 30)[0] == partial

@@ -58,7 +58,7 @@ static void print(int rank, const char* when, cost before, cost now) {
          now.resident_kib - before.resident_kib);
 }
 
-/* How often `text` is in the file. */
+/* The number of times that `text` occurs in the file. */
 static int count_in(FILE* file, const char* text) {
   static char content[65536];
   rewind(file);
@@ -113,7 +113,7 @@ int main(int argc, char** argv) {
   if (fegetexcept() != (FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW)) fail("initialising changed what traps");
   const int times = count_in(said, text);
   if (code != wanted) fail("initialising returned another code than it must");
-  if (strcmp(text, "-") != 0 && times != (rank == 0 ? 1 : 0)) fail("rank 0 must say it, once");
+  if (strcmp(text, "-") != 0 && times != (rank == 0 ? 1 : 0)) fail("rank 0 must print it, once");
   if (code == VDI_CATALYST_OK) {
     const cost initialised = measure();
     print(rank, "initialised", none, initialised);

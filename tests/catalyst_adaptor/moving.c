@@ -17,7 +17,7 @@ enum { PERIOD = 20, SIDE = 4, COARSE = 6, FINE = 12, MAX_VALUES = FINE * FINE * 
 
 static float values[SIDE * SIDE * SIDE][MAX_VALUES];
 
-/* A number from 0 on that the step and the place decide, the same on all ranks. */
+/* A hash of the step and the place, the same on all ranks. */
 static unsigned hash(unsigned step, unsigned place) {
   unsigned x = step * 2654435761U + place * 40503U + 12345U;
   x ^= x >> 15;
@@ -92,7 +92,7 @@ int main(int argc, char** argv) {
   const long late = resident_kib();
   wrong += vdi_catalyst_finalize(catalyst) != VDI_CATALYST_OK;
   printf("rank %d: %ld KiB after a fifth of %d frames, %ld KiB after all\n", rank, early, frames, late);
-  /* A leak of a hundred bytes a frame shows in 10 000; fewer frames tell of larger ones. */
+  /* A leak of a hundred bytes a frame shows in 10 000; fewer frames reveal larger ones. */
   if (early > 0 && late - early > 2048) {
     fprintf(stderr, "rank %d: the memory has grown by %ld KiB\n", rank, late - early);
     ++wrong;

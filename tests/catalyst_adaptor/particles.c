@@ -21,7 +21,7 @@ typedef struct particle {
 
 static particle particles[COUNT + FAULTS];
 
-/* From -1 to 1, the same on all ranks. */
+/* A random number from -1 to 1, the same on all ranks. */
 static double random_number(uint64_t* state) {
   *state = *state * 6364136223846793005U + 1442695040888963407U;
   return (double)(*state >> 11U) / (double)(1ULL << 52U) - 1.0;
@@ -145,7 +145,7 @@ int main(int argc, char** argv) {
                     vdi_catalyst_set_array_offset(catalyst, "V", VDI_CATALYST_CELLS, offset));
   }
 
-  /* Particles take the place of an array, and the other way round. */
+  /* Particles replace an array, and an array replaces particles. */
   static double zeros[N * N * N];
   const void* data[8];
   for (int i = 0; i < 8; ++i) data[i] = zeros;

@@ -35,7 +35,7 @@
 
 namespace {
 
-using State = std::map<std::string, std::string>;  // by what it is
+using State = std::map<std::string, std::string>;  // by name
 
 constexpr int lastSignal = 64;
 
@@ -53,7 +53,7 @@ std::string textOf(const Value& value) {
   return text.str();
 }
 
-/// The bits of anything.
+/// A value's bytes as text.
 template <typename Value>
 std::string bitsOf(const Value& value) {
   std::array<unsigned char, sizeof(Value)> bytes{};
@@ -74,7 +74,7 @@ std::string setOf(const sigset_t& signals) {
 void addSignals(State& state) {
   for (int signal = 1; signal <= lastSignal; ++signal) {
     struct sigaction action {};
-    if (sigaction(signal, nullptr, &action) != 0) continue;  // those that threads of libc use
+    if (sigaction(signal, nullptr, &action) != 0) continue;  // signals that libc's threads use
     state["signal " + textOf(signal)] = textOf(reinterpret_cast<const void*>(action.sa_sigaction)) +
                                         ", flags " + textOf(action.sa_flags) + ", blocks " +
                                         setOf(action.sa_mask);
@@ -192,7 +192,7 @@ void makeOwnSettings() {
     action.sa_flags = SA_RESTART;
     sigemptyset(&action.sa_mask);
     sigaddset(&action.sa_mask, SIGWINCH);
-    if (signal != SIGCHLD) sigaction(signal, &action, nullptr);  // fails where it can't be, SIGKILL for one
+    if (signal != SIGCHLD) sigaction(signal, &action, nullptr);  // fails for SIGKILL, for example
   }
   std::setlocale(LC_ALL, "C");
   std::setlocale(LC_NUMERIC, "C.UTF-8");  // the only other locale that exists everywhere

@@ -1,5 +1,5 @@
 """Makes a VDI at each step, sends the simulation a signal, and changes what a script can change in the process that runs it.
-What it sets in the environment it finds again at the next step."""
+Its settings in the environment are still there at the next step."""
 
 import errno
 import locale

@@ -1,6 +1,6 @@
-/* A simulation in C: one block of 8-bit point data a rank, along x. Arguments: the script, then the code that
- * each step must return, or CODE*STEPS. Exit status 0 if all did and each failure had a text. Environment:
- * VDI_TEST_INITIALIZE=CODE: initialize returns that, and nothing else happens, unless
+/* A simulation in C: one block of 8-bit point data per rank, along x. Arguments: the script, then the code
+ * that each step must return, or CODE*STEPS. Exit status 0 if all did and each failure had a text.
+ * Environment: VDI_TEST_INITIALIZE=CODE: initialize returns that, and nothing else happens, unless
  * VDI_TEST_THEN=SCRIPT: initialize with that script succeeds and is finalized.
  * VDI_TEST_WANTS=1010: what vdi_catalyst_wants says before each step.
  * VDI_TEST_LATE=1: finalize is called after MPI_Finalize.
@@ -34,7 +34,7 @@ static void simulate(int rank, int step) {
   }
 }
 
-/* While a frame is made in another process, it may be unknown that a step isn't wanted. */
+/* While another process makes a frame, the adaptor may not know yet that a step isn't wanted. */
 static int wants_in_the_end(vdi_catalyst* catalyst, int step, int wanted) {
   int wants = vdi_catalyst_wants(catalyst, step, 0.5 * step);
   for (int i = 0; is_late && i < 600 && wants > wanted; ++i) {

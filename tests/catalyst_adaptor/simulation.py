@@ -1,5 +1,5 @@
-"""A simulation in Python: numpy's arrays, mpi4py's communicator, one block of cells a rank. Arguments: the library, how ctypes
-loads it (CDLL, which releases Python's lock in a call, or PyDLL), the script, the first of the steps up to 2."""
+"""A simulation in Python: numpy's arrays, mpi4py's communicator, one block of cells per rank. Arguments: the library, how
+ctypes loads it (CDLL, which releases Python's lock in a call, or PyDLL), the script, the first of the steps up to 2."""
 
 import ctypes
 import os
@@ -26,7 +26,7 @@ done = threading.Event()
 
 
 def beat():
-    """Another thread of Python's, as simulations have for their output."""
+    """A second Python thread, such as simulations use for their output."""
     while not done.wait(0.01):
         beats.append(len(beats))
 

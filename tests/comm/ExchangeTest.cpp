@@ -35,7 +35,7 @@ std::uint64_t bytesOf(int from, int to, int round) {
 
 enum class Trouble { None, NoRoom, NotOpened };
 
-/// As long as it lives, this process cannot create files, or cannot open any.
+/// While it exists, this process cannot create files, or cannot open any.
 class Limit {
  public:
   explicit Limit(__rlimit_resource kind) : kind_(kind) {

@@ -164,7 +164,7 @@ TEST_CASE("values beside points and cells' middles come from the blocks that own
     block.moveValues(offset);
   }
   const std::vector<Block> after = comm::exchangeGhosts(world, before);
-  // The lattice's values, where they lie.
+  // The positions of the lattice's first and last values.
   const glm::dvec3 first = lattice.origin + ((cells ? 0.5 : 0.0) + offset) * lattice.spacing;
   const glm::dvec3 last = first + glm::dvec3(lattice.size - 1) * lattice.spacing;
   REQUIRE(after.size() == before.size());

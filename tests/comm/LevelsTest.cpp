@@ -107,7 +107,7 @@ Box shrunk(const Box& box, double by) {
   return {box.lo + by, box.hi - by};
 }
 
-/// 3 x 3 x 3 cubes of side 1, with `cells` cells a side in turns.
+/// 3 x 3 x 3 cubes of side 1, with `cells` cells per side in turns.
 std::vector<Block> cubes(Kind kind, const std::vector<int>& cells) {
   std::vector<Block> all;
   for (int i = 0; i < 27; ++i) {
@@ -240,7 +240,7 @@ TEST_CASE("blocks of different types get one type that represents all") {
 
 TEST_CASE("gaps of points between levels get an owner") {
   const Communicator world = Communicator::world();
-  // Cells a side, and the distance from the first block's last point, at 1, to the second block.
+  // Cells per side, and the distance from the first block's last point, at 1, to the second block.
   const auto [first, second, gap] =
       GENERATE(std::tuple(8, 4, 0.25), std::tuple(8, 4, 0.125), std::tuple(4, 8, 0.25),
                std::tuple(4, 8, 0.125), std::tuple(8, 8, 0.05));

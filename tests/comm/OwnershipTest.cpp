@@ -1,4 +1,4 @@
-// Ownership of lists: no communication, any number of ranks.
+// Ownership of lists, for any number of ranks. There is no communication.
 #include <algorithm>
 #include <numeric>
 #include <random>
@@ -55,7 +55,7 @@ TEST_CASE("shares are equal if they fit") {
 TEST_CASE("all ranks share material in one corner of a picture") {
   constexpr std::uint64_t width = 400;
   constexpr std::uint64_t height = 400;
-  // 20 supersegments a list in the lowest tenth of the rows.
+  // 20 supersegments per list in the lowest tenth of the rows.
   std::vector<std::uint32_t> weights(height / 4, 0);
   for (std::size_t i = 0; i < weights.size() / 10; ++i) weights[i] = 4 * width * 20;
   constexpr int ranks = 16;

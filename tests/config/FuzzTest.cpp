@@ -1,5 +1,5 @@
 // Documents cut, spliced and altered at random: each is refused with its place, or gives a run that can be
-// made. VDI_FUZZ_SECONDS goes on for so long.
+// made. VDI_FUZZ_SECONDS sets the duration.
 #include <algorithm>
 #include <random>
 #include <string>
@@ -74,7 +74,7 @@ std::string mutated(const std::vector<std::string>& seeds, std::mt19937& random)
   return text;
 }
 
-/// Returns whether it is refused.
+/// Returns whether the text is refused.
 template <typename Read>
 bool isRefused(const std::string& text, Read read) {
   try {

@@ -77,7 +77,7 @@ def saved_state():
 
 @functools.cache
 def run_documents():
-    """All JSON files, one after the other in one program, on one rank for the test's time. The second run of
+    """All JSON files, one after the other in one program, on one rank to save time. The second run of
     restart.json begins where a checkpoint of the first may have been."""
     runs = []
     for name, first, end in (("cameras.json", 0, 11), ("cinema.json", 0, 1), ("condition.json", 0, 31),

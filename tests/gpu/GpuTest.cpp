@@ -409,7 +409,7 @@ TEST_CASE("host memory that starts and ends anywhere is imported without a copy,
 
 namespace {
 
-/// Data as a driver's, for the key's device.
+/// Cache data in a driver's format, for the key's device.
 std::vector<std::byte> cacheData(const PipelineCacheKey& key, std::size_t size) {
   VkPipelineCacheHeaderVersionOne header{
       sizeof header, VK_PIPELINE_CACHE_HEADER_VERSION_ONE, key.vendor, key.device, {}};

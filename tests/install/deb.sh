@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes the .deb, looks at what it depends on and has, and runs its tool where it was unpacked. Arguments: the build folder, an
-# output folder, the libraries' folder in the package, Python.
+# Makes the .deb, checks its dependencies and files, and runs its tool from where it was unpacked. Arguments: the build
+# folder, an output folder, the libraries' folder in the package, Python.
 set -euo pipefail
 build=$1
 libraries=$3

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds the programs of tests/install/project with the compilers alone, asking pkg-config, and runs two of them in a
-# folder of their own. Arguments: the pkgconfig folder, the script, the output folder.
+# Builds the programs of tests/install/project with the compilers alone and pkg-config's flags, and runs two of them in
+# a folder of their own. Arguments: the pkgconfig folder, the script, the output folder.
 set -euo pipefail
 project=$(dirname "$(realpath "$0")")/project
 export PKG_CONFIG_PATH=$1

@@ -1,4 +1,4 @@
-// Whole files: the results of reading and writing when things go wrong.
+// Reading and writing of whole files, also when something goes wrong.
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>

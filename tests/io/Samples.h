@@ -58,8 +58,8 @@ inline Vdi emptyVdi(int width, int height, std::uint32_t budget) {
   return vdi;
 }
 
-/// Lists of any length up to the budget, with any values that validate(Vdi) accepts, which a compressor
-/// cannot predict.
+/// A VDI with lists of any length up to the budget and random values, which validate(Vdi) accepts and a
+/// compressor cannot predict.
 inline Vdi noisyVdi(int width, int height, std::uint32_t budget, std::uint64_t seed = 1) {
   Vdi vdi = emptyVdi(width, height, budget);
   Noise noise(seed);
@@ -134,7 +134,7 @@ inline Vdi compact(const Vdi& vdi) {
   return result;
 }
 
-/// As long as it lives, files of this process cannot grow beyond `bytes`.
+/// While it exists, files of this process cannot grow beyond `bytes`.
 class FileSizeLimit {
  public:
   explicit FileSizeLimit(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {

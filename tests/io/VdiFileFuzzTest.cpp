@@ -1,6 +1,6 @@
 // Damaged .vdi files, the same ones in every run: each must be refused with Error{Format}. A file whose
-// checksums were recomputed may pass, but must give a VDI that validate() accepts. VDI_FUZZ_SECONDS=600 goes
-// on with other ones in the last case. Also meant to run under sanitizers.
+// checksums were recomputed may pass, but must give a VDI that validate() accepts. With VDI_FUZZ_SECONDS=600,
+// the last case goes on with others for that time. Also meant to run under sanitizers.
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -86,7 +86,7 @@ void alter(std::vector<std::byte>& bytes, test::Noise& noise) {
   const std::uint32_t length = std::min(1 + noise.below(16), size - from);
   const auto place = bytes.begin() + from;
   switch (noise.below(8)) {
-    case 0: {  // a number of the extremes
+    case 0: {  // an extreme number
       constexpr std::array<std::uint32_t, 6> numbers{0, 1, 0x7fffffff, 0x80000000, 0xffffffff, 0x7f800000};
       put32(bytes, std::min(from / 4 * 4, size - 4), numbers[noise.below(numbers.size())]);
       break;

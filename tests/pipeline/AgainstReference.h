@@ -25,8 +25,8 @@ inline std::vector<Block> withLayers(const std::vector<Block>& blocks) {
   return comm::exchangeGhosts(comm::Communicator::serial(), blocks);
 }
 
-/// Whether the device's view equals the reference's. Where rounding decides to which place a face leans, a
-/// sheared view has a pixel or two of its own.
+/// Whether the device's view equals the reference's. In a sheared view, rounding may decide where a face
+/// leans, so a pixel or two may differ.
 inline bool isView(const Image& seen, const Image& expected, Reconstruction reconstruction) {
   const bool sheared = reconstruction == Reconstruction::Sheared;
   std::size_t different = 0;

@@ -30,7 +30,7 @@ std::vector<Blending> modes(double top) {
           {BlendMode::Isosurface, {0.7 * top, 0.45 * top, 0.55 * top}}};
 }
 
-/// Opacities of its own for low and high scalars, so that minima and maxima are seen.
+/// A function that shows low and high scalars, so that minima and maxima are seen.
 TransferFunction valley(double top) {
   TransferFunction function = test::threeHues(top);
   function.opacities = {{0.0, 0.9}, {0.3 * top, 0.4}, {0.5 * top, 0.1}, {0.75 * top, 0.6}, {top, 0.0}};
@@ -165,7 +165,7 @@ TEST_CASE("blending: an extreme that the transfer function hides still counts, a
   for (const glm::vec4& pixel : image.rgba) {
     for (int c = 0; c < 4; ++c) CHECK((pixel[c] >= 0.0F && pixel[c] <= 1.0F));
   }
-  // The column of NaN alone is as transparent as what lies beside the volume.
+  // A column of only NaN is as transparent as the space beside the volume.
   CHECK(image.rgba[12 * 24 + 23].a == 0.0F);
 }
 
@@ -222,7 +222,7 @@ TEST_CASE("blending: what can't be is refused by name") {
   refused({BlendMode::Maximum, {0.5}}, "isovalues need blend mode isosurface, not maximum");
   CHECK_THROWS_WITH(blendModeFromString("mip"),
                     vdi::test::ContainsSubstring("composite, maximum, minimum or isosurface"));
-  // A VDI holds composite blending alone.
+  // A VDI holds only composite blending.
   const test::Lattice lattice(glm::ivec3(4), glm::dvec3(1.0), [](const glm::dvec3& p) { return p.x / 3.0; });
   VdiGenerator generator(test::device(), comm::Communicator::serial());
   generator.setBlocks({lattice.block(ScalarType::F32, 1.0)});

@@ -23,11 +23,11 @@ struct Bound {
   double pixels;  // share of pixels off by more than 8/255
 };
 
-/// Bounds for pictures, in 1/255. At eight samples a voxel, the scalar is nearly linear within a sample: the
-/// measured difference is 0.3 at most and 0.04 on average. At one sample a voxel it is not, since trilinear
-/// cells are cubic along a ray: 3.7 and 0.5. Steep functions make edges, and a pixel at the edge of an opaque
-/// object is all wrong or right: 0.7 and 8 % of the pixels. automaticRate is one sample a voxel or more. GPUs
-/// filter textures with 8-bit weights.
+/// Bounds for pictures, in 1/255. At eight samples per voxel, the scalar is nearly linear within a sample:
+/// the measured difference is 0.3 at most and 0.04 on average. At one sample per voxel it is not, since
+/// trilinear cells are cubic along a ray: 3.7 and 0.5. Steep functions make edges, and a pixel at the edge of
+/// an opaque object is all wrong or right: 0.7 and 8 % of the pixels. automaticRate is one sample per voxel
+/// or more. GPUs filter textures with 8-bit weights.
 inline Bound boundOf(const gpu::Device& device, double rate, bool steep) {
   const double coarse = device.isCpu() ? 1.0 : 3.0;
   if (rate > 1.0)

@@ -271,7 +271,7 @@ TEST_CASE("many bands, one narrow band, constant data, one opaque voxel: V_O's p
 
   generator.setBlocks(
       {cube(17, 1.0 / 16.0, [](const glm::ivec3& i) { return i == glm::ivec3(8) ? 1.0F : 0.0F; })});
-  // At one sample a voxel, volume rendering itself may miss the opaque voxel from the side.
+  // At one sample per voxel, volume rendering itself may miss the opaque voxel from the side.
   GenerateSettings fine = test::smallSettings(160, 120, 6);
   fine.samplesPerVoxel = 4.0;
   requireFaithful(generator, test::oblique(), band(1.0, 0.8), fine);
@@ -362,7 +362,7 @@ TEST_CASE("values beyond single precision: a right picture or an error") {
     CHECK(refused(blockOf(ScalarType::F32, 1.0, spacing), "spacing must be"));
   for (const double origin : {1e13, 1e15})
     CHECK(refused(blockOf(ScalarType::F32, 1.0, 1.0, origin), "spacings from"));
-  // Tiny values next to larger ones count as 0, and zeros alone are legal.
+  // Tiny values next to larger ones count as 0, and data of only zeros are legal.
   CHECK_NOTHROW(generator.setBlocks({blockOf(ScalarType::F32, 0.0)}));
   Block beside = blockOf(ScalarType::F32, 1e-40);
   beside.origin.x += 7.0;
@@ -428,7 +428,7 @@ TEST_CASE("a camera too far away and a ray too long for the device are refused")
   fine.samplesPerVoxel = 2.0;
   CHECK(codeOf([&] { generator.renderVolume(along, test::threeHues(100.0), fine); }) ==
         ErrorCode::InvalidArgument);
-  // One that the device can take shows what lies at its end.
+  // A ray that the device can take shows the material at its end.
   CHECK(highestOpacity(*generator.renderVolume(along, test::threeHues(100.0), settings)) > 0.5F);
 }
 

@@ -79,7 +79,7 @@ TEST_CASE("a VDI is the same in any layout of its blocks' values") {
 }
 
 TEST_CASE("a device that reads rows and slices from the host's memory finds them") {
-  const OneCore one;  // more of them copy the values themselves
+  const OneCore one;  // with more cores, the host copies the values
   const auto type = GENERATE(ScalarType::U8, ScalarType::U16, ScalarType::F32);
   const std::vector<Block> packed = decomposed({104, 106, 108}, glm::ivec3(1), Joint::SharedPoints, type);
   const CompactLists expected = listsOf(packed, type);

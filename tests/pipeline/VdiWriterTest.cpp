@@ -1,5 +1,4 @@
-// All ranks write one file. It equals the file of one rank, whichever ranks have which lists, or there is
-// none.
+// All ranks write one file, which equals the file of one rank however the lists are dealt, or no file at all.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>

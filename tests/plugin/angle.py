@@ -1,5 +1,5 @@
-"""Windows, which pvpython has, say how far the view is turned from the VDI's viewpoint; pictures that are taken leave it
-out. representation.py tells that pvbatch does, too."""
+"""Windows, which pvpython has, show the angle between the view and the VDI's viewpoint; screenshots omit it.
+representation.py checks that pvbatch omits it, too."""
 
 
 import numpy as np

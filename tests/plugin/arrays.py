@@ -112,7 +112,7 @@ picture(image)
 check(image.LookupTable is None, "a script's choice of no map survives an update")
 simple.Delete(image)
 
-# The window's panel blanks the choice of a filter that a script has made before its input had data.
+# If a script makes a filter before its input has data, the window's panel blanks the filter's choice.
 image = simple.VolumetricDepthImage(Input=ball, SelectInputScalars=["POINTS", "temperature"], Resolution=SIZE)
 expected, table = picture(image), image.LookupTable
 for blank in (["POINTS", ""], ["CELLS", ""]):

@@ -15,7 +15,7 @@ def waves_source(name, as_cells):
 
 
 def set_blend(representation, number, values):
-    """By number: ParaView's panel doesn't offer each mode for each kind of data."""
+    """Sets the mode by number, because ParaView's panel doesn't offer each mode for each kind of data."""
     representation.SMProxy.GetProperty("BlendMode").SetElement(0, number)
     representation.SMProxy.UpdateVTKObjects()
     if values:

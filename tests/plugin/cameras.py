@@ -1,5 +1,5 @@
 """Filters of one input share its volume: another camera costs no upload and next to no memory, its VDI is that of a filter
-alone, and what one of them does leaves the others' as they are. On any number of ranks. The times are this machine's."""
+alone, and none of them changes another's VDI. On any number of ranks. The times are this machine's."""
 
 import time
 

@@ -24,7 +24,7 @@ class Session:
         relayed = self.relay.stdout.readline().strip()
         with open(LOG, "w") as log:
             self.server = server.start_reverse(relayed, ranks=2, stdout=log, stderr=log)
-            os.dup2(log.fileno(), 2)  # what this process says, too
+            os.dup2(log.fileno(), 2)  # this process's output, too
         simple.ReverseConnect(port)
         simple.LoadPlugin(os.environ["VDI_PLUGIN"], remote=True, ns=simple.__dict__)
         return self

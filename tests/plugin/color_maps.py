@@ -78,7 +78,7 @@ def text(numbers):
 
 
 def is_steep(scene):
-    """Whether a 256th of the data's range has an eighth of all that a colour or an opacity can change."""
+    """Whether a colour or an opacity changes by an eighth of its range within a 256th of the data's range."""
     stretch = optical.TABLE // 256
     low, high = scene.rays.low, scene.rays.high  # as in the picture, whose tables these are
     colors = optical.color_table(scene.colors.GetClientSideObject(), low, high)
@@ -110,13 +110,13 @@ def check_picture(name, scene, with_volume):
 
 
 def rainbow(count):
-    """Control points in hues that come around, none of them grey."""
+    """Control points whose hues recur, none of them grey."""
     places = np.linspace(0, 1, count)
     return [(x, 0.5 + 0.5 * np.sin(9 * x), 0.5 + 0.5 * np.sin(9 * x + 2), 0.5 + 0.5 * np.sin(9 * x + 4)) for x in places]
 
 
 def channels(*which):
-    """A ramp of those channels alone, falling and rising."""
+    """A ramp of only those channels, falling and rising."""
     def color(value):
         return [value if channel in which else 0.0 for channel in range(3)]
 

@@ -78,13 +78,13 @@ for mode in ("Slice", "Composite"):
     with Messages("WarningEvent") as said:
         picture(vdi_filter(source, view, "CELLS", "field", 2.0, Resolution=[0, 0]))
     about = [message for message in said if "Blend Mode" in message]
-    check(len(about) == (0 if mode == "Composite" else 1), "%s: %d messages that it can't be had" % (mode, len(about)))
+    check(len(about) == (0 if mode == "Composite" else 1), "%s: %d messages that it isn't supported" % (mode, len(about)))
 for name, usual, value, words in (("UseSeparateOpacityArray", 0, 1, "Separate Opacity Array"),
                                   ("UseTransfer2D", 0, 1, "2D Transfer Function"),
                                   ("Scale", [1, 1, 1], [1, 1, 2], "Transforming")):
     setattr(representation, name, value)
     with Messages("WarningEvent") as said:
         vdi_filter(source, view, "CELLS", "field", 2.0, Resolution=[0, 0]).UpdatePipeline()
-    check(len(said) == 1 and words in said[0], "%s: a message that it can't be had: %s" % (name, " | ".join(said)))
+    check(len(said) == 1 and words in said[0], "%s: a message that it isn't supported: %s" % (name, " | ".join(said)))
     setattr(representation, name, usual)
 finish()

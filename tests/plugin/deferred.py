@@ -30,7 +30,7 @@ def asked(image, name):
 
 
 def prepare(image):
-    """As the window does, until it's there."""
+    """Prepares the VDI as the window does, until it is complete."""
     image.SMProxy.InvokeCommand("Prepare")
     end = time.monotonic() + 60
     while 0 <= asked(image, "Preparation") < 100 and time.monotonic() < end:

@@ -68,7 +68,7 @@ check(extracted["white"].min() < 200 and (extracted["white"][extracted[20].max(a
 
 
 def prepare(image):
-    """As the window does: the ranks get on while they're asked to."""
+    """Prepares the VDI as the window does: the ranks progress while they are asked to."""
     image.SMProxy.InvokeCommand("Prepare")
     percent = image.GetProperty("Preparation")
     for _ in range(100000):

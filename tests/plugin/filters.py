@@ -271,8 +271,8 @@ def overwrite(*modified):
 
 check(changed_by(watched, lambda: overwrite(in_place)) > 8, "values overwritten in an array: another picture")
 check(changed_by(watched, lambda: overwrite(producer.GetClientSideObject())) > 8,
-      "values that their source alone says are new: another picture")
-check(changed_by(watched, lambda: setattr(watched, "FillGhosts", 0)) == 0, "ghost layers that nothing lacks change nothing")
+      "values that only their source reports as new: another picture")
+check(changed_by(watched, lambda: setattr(watched, "FillGhosts", 0)) == 0, "ghost layers that no block lacks change nothing")
 check(changed_by(watched, lambda: setattr(watched, "Input", wavelet)) > 8, "another input: another picture")
 
 # Composite and cell data.

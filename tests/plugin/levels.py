@@ -56,7 +56,8 @@ def grid_of(lo, hi, count, values, flags=None, kind=vtkUniformGrid):
     return grid
 
 
-# Along x alone, so that the domain's faces, where half a coarse cell has nothing beside it, look the same on any level.
+# The field varies only along x, so that the domain's faces, where half a coarse cell has nothing beside it, look the
+# same on any level.
 def along(x, y, z):
     return x
 
@@ -143,7 +144,7 @@ def says(text, name):
     return "block 2 of vtkMultiBlockDataSet" in text and "'%s'" % name in text
 
 
-# As a simulation hands them over: VTK's own filters see to it that lengths fit.
+# Arrays as a simulation hands them over; VTK's own filters ensure that lengths fit.
 short = points_of([n + 1] * 3, values[:-2])
 check(says(errors_of(lambda: update_with_second(short, "POINTS")), "f"), "a short array is refused, with its name and block")
 short = points_of([n + 1] * 3, values, flags[:-2])

@@ -88,7 +88,7 @@ look(view)
 view.CameraPosition = [30, 30, 40]
 again = look(view)
 check(made.std() > 20 and pvtest.ssim(made, again) > 0.999, "the output of a filter is shown again on a new device")
-# And one that is lost while it makes them.
+# A device that is lost while the filter makes VDIs.
 open(LOSE, "w").close()
 image.SamplingRate = 1.5
 finer = look(view)

@@ -1,13 +1,13 @@
 """The optical model alone, in double precision: emission and absorption along a ray through a trilinear field. It shares
-nothing with the product: no table of samples, no slabs, no blocks, no shader. Colours and opacities are asked from VTK's own
-functions."""
+nothing with the product: no table of samples, no slabs, no blocks, no shader. VTK's own functions give colours
+and opacities."""
 
 import functools
 
 import numpy as np
 
 SAMPLES_PER_VOXEL = 64
-TABLE = 65537  # places at which a function is asked
+TABLE = 65537  # places at which a function is sampled
 
 
 def rays_of(view):

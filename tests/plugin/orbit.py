@@ -1,5 +1,5 @@
-"""How fast a VDI orbits in a view of 1280 x 720, and that neither that nor time steps take more and more memory. The figures
-are this machine's; on one that does other things as well they're lower. Arguments: the parts to run (fluid, recognisable,
+"""Measures how fast a VDI orbits in a view of 1280 x 720, and checks that neither orbits nor time steps leak memory.
+The figures are this machine's; they are lower on a busy one. Arguments: the parts to run (fluid, recognisable,
 memory)."""
 
 import os
@@ -64,13 +64,13 @@ def fluid():
 
 
 def recognisable():
-    """However few frames a second there are: a part of a fine structure, from the side."""
+    """A part of a fine structure, from the side, can be recognised at any frame rate."""
     reader = simple.OpenDataFile(make("orbit_coil.vdi", "--size", "96x96x96", "--resolution", "960x540", "--azimuth", "0",
                                       field="coil"))
     view = shown(reader, SIZE)
     simple.GetDisplayProperties(reader, view).VDIFrameRate = 240
     view.CameraPosition = [1.5, 0.7, 0.5]
-    interactive_seconds(view, 6, 0.1)  # it takes as few pixels as it may
+    interactive_seconds(view, 6, 0.1)  # brings the pixels down to the fewest allowed
     seconds = interactive_seconds(view, 6, 0.1)
     rough = pvtest.pixels(view.GetRenderWindow())
     whole = pvtest.screenshot(view, "orbit_coil.png", SIZE)

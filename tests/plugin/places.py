@@ -1,4 +1,4 @@
-"""Where views show what isn't the VDI itself: Outline is the volume's box, Slice the flat picture in the middle of it.
+"""The places of representations other than VDI: Outline is the volume's box, Slice the flat picture in the middle of it.
 Reset Camera looks at either. No other representation is offered."""
 
 import numpy as np
@@ -13,7 +13,7 @@ CENTER = [120, -30, 47]
 
 
 def volume():
-    """Far from the origin, and longest along z."""
+    """A volume far from the origin, and longest along z."""
     source = simple.ProgrammableSource()
     source.OutputDataSetType = "vtkImageData"
     source.ScriptRequestInformation = """
@@ -72,7 +72,7 @@ def outline(source, image, view, camera):
         middle = shown_as(display, view, kind)
         check(np.linalg.norm(middle - CENTER) < 1, "Reset Camera looks at the scene with {}: {}".format(kind, middle))
     display.SetRepresentationType("Outline")
-    # As the VDI, it stays. ParaView 5.13 renamed Position.
+    # Like the VDI, Outline stays in place. ParaView 5.13 renamed Position.
     place = "Translation" if "Translation" in display.ListProperties() else "Position"
     setattr(display, place, [50, 0, 0])
     look(view, camera)
@@ -102,7 +102,7 @@ def flat_picture(image, view, camera, what):
     half = np.abs(2 * screenshot(view, what + "_half").astype(int) - seen).max()
     check(half <= 3, "Opacity 0.5 shows Slice half as opaque, {}".format(what))
     display.Opacity = 1
-    # From above the viewpoint's axis is seen from its side, and so is the rectangle: a line through the middle.
+    # From above, the rectangle is seen edge-on, as a line through the middle.
     position, up = np.array(camera, float), np.array([0.0, 1, 0])
     forward = (CENTER - position) / np.linalg.norm(CENTER - position)
     right = np.cross(forward, up)

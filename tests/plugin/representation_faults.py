@@ -1,6 +1,6 @@
 """The representation VDI where there is nothing to show: a series whose steps differ and of which one is damaged and one
-missing, an empty VDI, data that are no VDI; and viewpoints that show nothing of a VDI, or nothing true. What is wrong is said
-in the view, and the next good frame is shown."""
+missing, an empty VDI, data that are no VDI; and viewpoints that show nothing of a VDI, or nothing true. The view
+says what is wrong, and shows the next good frame."""
 
 import os
 import shutil
@@ -151,7 +151,7 @@ picture.CameraPosition, picture.CameraFocalPoint = [40, 30, 50], [0, 0, 0]
 simple.Show(picture, view)
 check(said_from([2.2, 1.9, 2.4]) == "From inside, this VDI is rough: press Regenerate From This View.",
       "the filter's VDI tells of its button, beside another one's")
-check(said_from([2, -1, 20], [40, -1, 20]).count("VDI") == 1, "what is to be said of two VDIs is said once")
+check(said_from([2, -1, 20], [40, -1, 20]).count("VDI") == 1, "a message that two VDIs share is shown once")
 display = simple.GetDisplayProperties(reader, view)
 display.Opacity = 0
 check(said_from([2, -1, 20], [40, -1, 20]).count("VDI") == 1,

@@ -1,4 +1,4 @@
-"""What ParaView saves of a filter: the defaults of later filters, and scripts that make the same VDI anew."""
+"""Tests what ParaView saves of a filter: the defaults of later filters, and scripts that make the same VDI anew."""
 
 import re
 
@@ -22,7 +22,7 @@ def shown_wavelet(**properties):
 
 
 def save_as_default(proxy):
-    """As the panel's button Save current settings as default does."""
+    """Saves the settings as the panel's button Save current settings as default does."""
     vtkSMSettings.GetInstance().SetProxySettings(proxy.SMProxy, None, True)
 
 
@@ -58,7 +58,7 @@ DISPLAY = dict(Shade=1, Diffuse=0.6, UseCropping=1, CroppingScale=[0.5, 0.6, 0.7
 
 
 def sets(script, name, setting):
-    """Whether the script sets it, each property by itself, or with others by Set, as from ParaView 6 on."""
+    """Whether the script sets the property, by itself or, as from ParaView 6 on, with others by Set."""
     together = "".join(re.findall(r"^%s\.Set\((.*?)^\)" % name, script, re.MULTILINE | re.DOTALL))
     return bool(re.search(r"^%s\.%s = " % (name, setting), script, re.MULTILINE) or
                 re.search(r"^ *%s=" % setting, together, re.MULTILINE))
@@ -92,7 +92,7 @@ def python_state():
 
 
 def what_is_set():
-    """What the first update takes of the view's display settings if camera, size or both are set."""
+    """Checks what the first update takes of the view's display settings if camera, size or both are set."""
     wavelet, view = shown_wavelet(**DISPLAY)
     camera = dict(CameraPosition=POSITION, CameraFocalPoint=[1, 0, -1])
     for what, properties, takes in (("nothing", {}, 1), ("a camera", camera, 1), ("a size", dict(Resolution=[64, 48]), 1),

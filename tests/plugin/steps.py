@@ -1,6 +1,6 @@
-"""Time steps that come while the camera moves: what they cost, and that pictures are right. Frames of an orbit may show the
-step before; frames at rest, screenshots and animations show the one that is asked for. The figures are this machine's; where
-other things run as well they're higher."""
+"""Measures time steps that come while the camera moves, and checks their pictures. Frames of an orbit may show the step
+before; frames at rest, screenshots and animations show the one that is asked for. The figures are this machine's; they are
+higher on a busy one."""
 
 import os
 import shutil
@@ -191,5 +191,5 @@ start = time.perf_counter()
 view.SMProxy.StillRender()
 resting = time.perf_counter() - start
 print("a step takes {} while the mouse moves the camera, the frame at rest behind that {}".format(ms(moving), ms(resting)))
-check(same(screenshot(view, "rest"), expected[9 % KINDS]), "when the mouse is let go, the frame at rest shows the step")
+check(same(screenshot(view, "rest"), expected[9 % KINDS]), "after the mouse button is released, the frame shows the step")
 pvtest.finish()

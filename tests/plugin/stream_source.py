@@ -1,5 +1,5 @@
-"""The source VDI Stream against `vdi serve` of a folder: what is shown is what an opened file shows, a new one arrives, Pause
-keeps one, a server comes back, and the token stays out of what is saved and said. On any number of ranks."""
+"""The source VDI Stream with `vdi serve` of a folder: it shows the same as an opened file, takes new VDIs, keeps one
+during Pause, returns to a restarted server, and keeps the token out of saved files and messages. On any number of ranks."""
 
 import os
 import shutil
@@ -42,7 +42,7 @@ class Folder:
         self.process, self.port = None, "0"
 
     def appear(self, step):
-        """As a simulation's file does: whole at once."""
+        """Makes a file appear whole at once, as a simulation's does."""
         shutil.copy(made(step), os.path.join(self.path, ".part"))
         os.rename(os.path.join(self.path, ".part"), os.path.join(self.path, "%06d.vdi" % step))
 
@@ -197,7 +197,7 @@ def wrong_token(live):
     text = standard_error(use)
     line = information(source, "Connection")
     check("the token is wrong" in line and "\n" not in line, "a wrong token makes one line: " + line)
-    check(text.count("the token is wrong") == 1, "a wrong token is said once: " + text)
+    check(text.count("the token is wrong") == 1, "a wrong token is reported once: " + text)
     check("the token is wrong" in message_in(view), "the view says that the token is wrong: " + message_in(view))
     check(wrong not in text + line + message_in(view), "no message contains the wrong token")
     source.URL = live.link

@@ -32,7 +32,7 @@ def session():
     return twice, view, representation
 
 
-# Nothing to take.
+# A filter without a view has nothing to take.
 alone = simple.VolumetricDepthImage(Input=simple.Wavelet())
 alone.Resolution = [32, 24]
 alone.UpdatePipeline()

@@ -23,8 +23,8 @@ for name, (kind, scale, as_cells, parallel_scale) in CASES.items():
     write_png("brain_%s.png" % name, np.hstack([ours, theirs]))
     simple.Delete(view)
 
-# One sample a voxel shows what eight show, where a surface is a voxel wide (no wood grain): opacity that rises from
-# 0 to 0.6 over a voxel of material, and opaque bands 4 % of the range wide. Volume rendering and VDI alike.
+# One sample per voxel shows what eight show, where a surface is a voxel wide (no wood grain): opacity that rises from 0
+# to 0.6 over a voxel of material, and opaque bands 4 % of the range wide. Volume rendering and VDI alike.
 BANDS = [0, 0]
 for middle in (50, 112.5, 175):
     BANDS += [middle - 5, 0, middle - 4.99, 1, middle + 4.99, 1, middle + 5, 0]
@@ -64,7 +64,7 @@ check(similar >= 0.999, "no red: SSIM with ParaView's own volume rendering %.4f"
 write_png("brain_no_red.png", np.hstack([ours, theirs]))
 
 
-# The default rate shows what eight samples a voxel show, and what ParaView shows, where hues change fast.
+# The default rate shows what eight samples per voxel show, and what ParaView shows, where hues change fast.
 def hue(share):
     return [float(np.clip(abs((share * 6 + shift) % 6 - 3) - 1, 0, 1)) for shift in (0, 4, 2)]
 

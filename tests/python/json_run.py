@@ -122,7 +122,7 @@ with Catalyst(MPI.COMM_WORLD, json=run) as catalyst:
     end_in_a_child(catalyst)
     link = open("link").read().strip()
     assert os.stat("link").st_mode & 0o777 == 0o600
-    # Not one of the ranks.
+    # The viewer isn't one of the ranks.
     alone = {name: value for name, value in os.environ.items() if not name.startswith(("OMPI_", "PMIX_"))}
     subprocess.run([sys.argv[1], "receive", link, "-o", "received", "--frames", "1"], env=alone, check=True, timeout=60)
 assert not os.path.exists("link")

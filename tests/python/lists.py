@@ -1,4 +1,4 @@
-"""A .vdi file's lists as NumPy arrays, and pictures of them, against what the tool says of the same file.
+"""A .vdi file's lists as NumPy arrays, and pictures of them, compared with the tool's output for the same file.
 
 Arguments: the tool, a folder."""
 
@@ -67,7 +67,7 @@ def check_file(precision):
     check(vdi.precision == precision and vdi.size == (81, 60) and len(vdi.offsets) == 81 * 60 + 1, "the shape: " + precision)
     check(vdi.offsets[-1] == len(vdi.segments) > 1000, "there are as many supersegments as the offsets say")
     check((vdi.segments["front"] < vdi.segments["back"]).all(), "each supersegment ends behind where it begins")
-    check(difference(flattened(vdi), path("flat.png")) <= 1.0, "the lists, one behind the other, are the picture")
+    check(difference(flattened(vdi), path("flat.png")) <= 1.0, "the composited lists are the picture")
 
     colors, depths = vdi.render()
     check(colors.shape == (60, 81, 4) and colors.dtype == np.float32 and depths.shape == (60, 81), "the picture's shape")
@@ -91,7 +91,7 @@ check_file("full")
 vdi = check_file("compact")
 check(vdi.metadata["array"]["name"] == "turbulence" and len(vdi.metadata["transferFunction"]["colors"]) > 1,
       "the metadata name the array and its colours")
-check(vdi.camera.parallel_scale is None and vdi.camera.azimuth(0.0) == vdi.camera, "the camera is one of perspective")
+check(vdi.camera.parallel_scale is None and vdi.camera.azimuth(0.0) == vdi.camera, "the camera is a perspective one")
 
 offsets, segments = vdi.offsets, vdi.segments
 total = float(segments["opacity"].sum())
@@ -117,5 +117,5 @@ vdi = pv_vdi.read(path("full.vdi"))
 inside = pv_vdi.Camera((0, 0, 0), (0, 0, 0))
 check(refused(lambda: vdi.render(inside), ["focal"]), "a camera without direction is refused")
 check(refused(lambda: vdi.render(size=(0, 5)), ["0"]), "a picture without pixels is refused")
-check(refused(lambda: vdi.render(reconstruction="sharp"), ["smooth"]), "a reconstruction that isn't there is refused")
+check(refused(lambda: vdi.render(reconstruction="sharp"), ["smooth"]), "an unknown reconstruction is refused")
 sys.exit(1 if failures else 0)

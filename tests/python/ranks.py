@@ -1,4 +1,4 @@
-"""That the files of several ranks are those of one, and change from step to step. Arguments: the folders."""
+"""Checks that the files of several ranks equal those of one, and change from step to step. Arguments: the folders."""
 
 import sys
 

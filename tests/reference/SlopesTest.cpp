@@ -39,7 +39,7 @@ SupersegmentLists listsOf(ListAt listAt) {
   return lists;
 }
 
-/// In no box.
+/// The slopes of lists that lie in no box.
 std::vector<Slopes> slopesOf(const SupersegmentLists& lists) {
   const View original(Camera{}, size.x, size.y);
   return reference::slopesOf(lists, original, unit, {facesOf({}, original), {}});

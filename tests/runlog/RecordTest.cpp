@@ -1,4 +1,4 @@
-// A frame's record: what ranks' reports come to, and what a line keeps of it.
+// A frame's record: its figures from the ranks' reports, and its lines.
 #include <cmath>
 #include <string>
 #include <vector>

@@ -1,4 +1,4 @@
-// The log's files: appended to, whole lines or none.
+// The log's files, to which lines are appended whole or not at all.
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>

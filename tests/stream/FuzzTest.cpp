@@ -1,7 +1,7 @@
 // Damaged, reordered and invented messages, in both directions: texts, conversations, and bytes on a real
-// connection. Each must be refused with Error{Format}, or the connection closed; nothing else may come of
-// them. The same ones in every run, for two seconds a case; VDI_FUZZ_SECONDS=600 goes on with others. Meant
-// to run under sanitizers.
+// connection. Each must be refused with Error{Format}, or the connection closed; nothing else may happen.
+// Each case has the same data in every run, for two seconds; with VDI_FUZZ_SECONDS=600 it goes on with others
+// for that time. Meant to run under sanitizers.
 #include <sys/socket.h>
 #include <unistd.h>
 

@@ -99,7 +99,7 @@ TEST_CASE("a viewer that acknowledges nothing gets a window, then the newest") {
   }
   CHECK(sent == outbox.window());
   CHECK(outbox.underWay() == sent);
-  CHECK(outbox.dropped() == 8);  // but the first, which came, and the newest
+  CHECK(outbox.dropped() == 8);  // all but the first, which arrived, and the newest
   // Acknowledgements of bytes that weren't sent free nothing.
   outbox.acknowledge({3, 0, mebibyte}, start + 2s);
   outbox.acknowledge({0, 1, mebibyte}, start + 2s);
@@ -258,7 +258,7 @@ TEST_CASE("a limit is kept") {
   CHECK(static_cast<double>(line.sent(0, 0)) < 4.0 * limit + 2.0 * chunkBytes);
   CHECK(static_cast<double>(line.sent(0, 0)) > 3.5 * limit);
   CHECK(outbox.rate() <= limit);
-  // It says when to ask again.
+  // The outbox says when to ask again.
   Outbox::Next next = outbox.next(start + 4s);
   while (next.part) next = outbox.next(start + 4s);
   REQUIRE(next.retry);

@@ -219,7 +219,7 @@ TEST_CASE("levels are put together from parts in order alone") {
   CHECK(whole->file == file);
   CHECK(whole->level == level);
   CHECK(refuses(assembly, second));
-  // One that is abandoned leaves nothing behind.
+  // An abandoned level leaves nothing behind.
   assembly.begin(level, file.size());
   CHECK_FALSE(assembly.add(first));
   assembly.begin(level, file.size());

@@ -15,7 +15,7 @@ using namespace vdi::stream;
 
 namespace {
 
-/// Changes the working directory, and back at its end.
+/// Changes the working directory until this object ends.
 class WorkingDirectory {
  public:
   explicit WorkingDirectory(const std::filesystem::path& path) { std::filesystem::current_path(path); }

@@ -62,7 +62,7 @@ Received nextOf(Client& client) {
   return resident * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
 }
 
-/// A key and a certificate of its own for that name.
+/// Writes a key and a self-signed certificate for that name.
 void writeCertificate(const std::filesystem::path& key, const std::filesystem::path& certificate,
                       const char* name) {
   EVP_PKEY* const pair = EVP_EC_gen("P-256");

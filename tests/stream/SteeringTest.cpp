@@ -21,7 +21,7 @@ Controls controls() {
   return result;
 }
 
-/// Where wishes are put.
+/// Collects wishes.
 struct Taken {
   std::vector<std::pair<std::uint32_t, Wish>> wishes;
 };

@@ -153,7 +153,7 @@ TEST_CASE("what stalled viewers keep is bounded, and the oldest goes first") {
   for (std::uint32_t id = 0; id < 40; ++id) {
     const Clock::time_point now = start + id * 1s;
     hub.publish(levels.frame(id), now);
-    // As a server does with viewers that are to go.
+    // As a server does with viewers that it disconnects.
     for (const auto& viewer : stalled) {
       if (viewer->viewer.isStalled()) viewer->writing = Viewer::Wait{};
     }
@@ -173,7 +173,7 @@ TEST_CASE("what stalled viewers keep is bounded, and the oldest goes first") {
   CHECK(lines.size() == 36);
   CHECK(lines.front().find("took nothing for") != std::string::npos);
 
-  // It's told why, and then it goes.
+  // The viewer gets the reason, and is then disconnected.
   Viewer& first = stalled.front()->viewer;
   const Viewer::Outgoing reason = first.next(start + 100s);
   REQUIRE(std::holds_alternative<std::string>(reason));

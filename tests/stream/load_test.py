@@ -56,7 +56,7 @@ def silent(server):
 
 
 def abrupt(server):
-    """Closes in the middle of its request, by a reset."""
+    """A client that resets its connection in the middle of its request."""
     connection = connect(server)
     connection.sendall(b"GET /stream HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgr")
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
@@ -64,7 +64,7 @@ def abrupt(server):
 
 
 def vanishing(server):
-    """Closes when a level has begun."""
+    """A viewer that closes when a level has begun."""
     viewer = Viewer(server.port, PATIENCE)
     viewer.hello(server.token)
     viewer.text_message("level")

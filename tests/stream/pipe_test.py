@@ -99,7 +99,7 @@ class PipeTest(ServedFolder):
             if announced["frame"] == 0:
                 break
         self.assertEqual(data, self.bytes_of("small0"))
-        # The first one goes on.
+        # The first viewer goes on.
         self.appear("small2", "c.vdi")
         announced, data = next(levels)
         self.assertEqual((announced["frame"], data), (2, self.bytes_of("small2")))

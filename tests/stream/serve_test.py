@@ -52,7 +52,7 @@ class ServeTest(ServedFolder):
         (self.live / "a.vdi").write_bytes(self.bytes_of("small0"))
         self.assertEqual(next(levels)[1], self.bytes_of("small0"))
         self.assertEqual(server.said().count("\n"), 1, server.said())
-        # The folder goes, which is told once, and comes again.
+        # The folder disappears, which is reported once, and comes back.
         shutil.rmtree(self.live)
         until(lambda: server.said().count("\n") == 2, "a line on the folder")
         self.live.mkdir()
@@ -84,7 +84,7 @@ class ServeTest(ServedFolder):
         self.assertEqual((part["from"], part["steps"]), (2, [4]))
         viewer.send(type="resume")
         frames = [next(levels)[0]["frame"]]
-        if frames == [1]:  # the series names a frame a moment before that is the newest
+        if frames == [1]:  # the series lists a frame a moment before it is the newest
             frames.append(next(levels)[0]["frame"])
         self.assertEqual(frames[-1], 2)
         viewer.send(type="show", index=9)

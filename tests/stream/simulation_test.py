@@ -12,7 +12,7 @@ PATIENCE = 150
 with tempfile.TemporaryDirectory() as name:
     folder = pathlib.Path(name)
     link = folder / "vdi-stream.link"
-    # It goes on until it's ended.
+    # The simulation runs until this test ends it.
     simulation = subprocess.Popen([*launch, "--size", "24", "--blocks", "2", "--steps", "1000000", "--every", "5", "--script",
                                    script], env={**os.environ, "VDI_OUTPUT": name}, stdout=subprocess.DEVNULL)
     try:

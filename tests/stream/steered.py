@@ -1,4 +1,4 @@
-"""Catalyst script that lets viewers steer. Each rank writes a line a step, with the properties that are in force, to
+"""Catalyst script that lets viewers steer. Each rank writes one line per step, with the properties that are in force, to
 view_RANK.txt."""
 import json
 import os

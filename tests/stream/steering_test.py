@@ -17,7 +17,7 @@ ISOLATED = os.environ.get("VDI_ISOLATION") == "process"
 CAMERA = {"position": [18, 20, 60], "focal_point": [18, 6, 6]}
 RUN = {"field": "V", "camera": CAMERA, "resolution": [96, 54], "output": "v_{timestep:06d}.vdi", "log": "run.jsonl",
        "colors": {"range": [0, 1], "opacities": [[0, 0], [1, 1]]}, "stream": {"steer": True}}
-PRESETS = ["bands", "haze"] if script == "json" else ["X Ray", "Viridis"]  # ParaView 5's have more to their names
+PRESETS = ["bands", "haze"] if script == "json" else ["X Ray", "Viridis"]  # ParaView 5's names are longer
 PATIENCE = 150
 
 
@@ -89,7 +89,7 @@ def drive(port, token, folder):
     driver.send(type="steer", parameters={"level": 1.5})
     check("from 0 to 1" in listen(driver, "denied")["cause"], "bounds hold")
 
-    # All of it in one message arrives at one step.
+    # All settings of one message take effect at the same step.
     camera = {"position": [60.0, 20.0, 30.0], "focalPoint": [18.0, 6.0, 6.0], "viewUp": [0.0, 1.0, 0.0], "viewAngle": 25.0}
     driver.send(type="steer", camera=camera, parameters={"level": 0.8125, "waves": 5}, resolution=[120, 60], supersegments=7,
                 sampling_rate=2, preset=PRESETS[0], range=[0.25, 0.75])
@@ -116,7 +116,7 @@ def drive(port, token, folder):
     driver.send(type="steer", parameters={"level": 0.125})
     steering(driver, lambda message: values(message)["level"] == 0.125)
     check(lines(folder / "parameters_0.txt") == before, "the simulation waits")
-    # A driver who goes lets it go on, and the next one may drive.
+    # When a driver leaves, the simulation goes on, and the next viewer may drive.
     driver.close()
     steering(other, lambda message: message["driver"] is None and not message["paused"])
     other.send(type="drive")
@@ -136,7 +136,7 @@ def files_of(folder):
 
 
 def in_files(folder, at, paused_at):
-    """Files are the VDIs of their steps, as they were to be made then. Views of a step that waits are for viewers alone."""
+    """Each file is the VDI of its step, by the settings then in force. Views made during a pause are for viewers only."""
     files = files_of(folder)
     check("96 x 54" in files[at] and "(18, 20, 60)" in files[at] and "at most 25 " in files[at], files[at])
     after = files[at + 1]

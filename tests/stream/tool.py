@@ -103,7 +103,7 @@ class ServedFolder(unittest.TestCase):
         return server
 
     def appear(self, made, name):
-        """As a simulation's file does: whole at once."""
+        """Makes a file appear whole at once, as a simulation's does."""
         shutil.copy(self.made / f"{made}.vdi", self.live / ".part")
         os.rename(self.live / ".part", self.live / name)
 

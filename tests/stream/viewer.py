@@ -41,7 +41,7 @@ class Peer:
         self.buffer = b""
 
     def head(self):
-        """What comes before the first frame."""
+        """The HTTP head before the first frame."""
         while b"\r\n\r\n" not in self.buffer:
             self.fill()
         head, self.buffer = self.buffer.split(b"\r\n\r\n", 1)
@@ -165,7 +165,7 @@ class Viewer(Peer):
                 announced, data = None, b""
 
     def end(self):
-        """Reads until the server closes; gives the code."""
+        """Reads until the server closes the connection; returns the code."""
         try:
             while True:
                 self.message()

@@ -46,7 +46,7 @@ TEST_CASE("a device makes the fields that are defined for the host") {
   const Part part{{3, 0, 7}, {67, 61, 45}, 0};
   for (const FieldInfo& info : fields()) {
     INFO(info.name);
-    // Shells end at a jump, which points may lie at either side of.
+    // Shells end at a jump, and points may lie on either side of it.
     const double jumps = info.name == "shells" ? 0.5 : 0.0;
     lattice.joint = Joint::SharedPoints;
     lattice.type = ScalarType::F32;

@@ -25,7 +25,7 @@ def made(array, step):
 
 
 def check_answers(window, what, action, array, step, seconds=ANSWER_SECONDS):
-    """`action` asks for that VDI. The window has to answer until it is there."""
+    """`action` requests that VDI. The window must answer until the VDI is there."""
     with Pulse(window) as pulse:
         begin = time.monotonic()
         action()
@@ -49,7 +49,7 @@ def first_apply(window):
 
 
 def others_wait(window):
-    """Whoever isn't a view gets the VDI that was asked for."""
+    """Callers other than views get the VDI that was asked for."""
     window.click("Undo Apply")
     wait_for("state from before", lambda: window.is_enabled("Apply"))
     window.click("Apply")
@@ -67,7 +67,7 @@ def others_wait(window):
 
 
 def choose_array(window, item):
-    """In the panel: a toolbar has such a box, too."""
+    """Chooses the array in the panel's box; a toolbar has such a box, too."""
     left, top, _, height = window.find("Select Input Scalars", "label").box
     window.click((left + 200, top + height // 2))
     window.type(item)

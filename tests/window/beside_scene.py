@@ -89,7 +89,7 @@ def save_film():
 
 
 def save_step(step):
-    """A picture of its VDI, which is made before anybody looks; that VDI's time."""
+    """Saves a picture of the step's VDI, which is made beforehand; returns that VDI's time."""
     simple.GetAnimationScene().AnimationTime = float(step)
     filter_now().UpdatePipeline(float(step))
     time = output_now()["time"]

@@ -5,11 +5,11 @@ import os
 import traceback
 
 OUTPUT = os.environ["VDI_TEST_OUTPUT"]
-kept = []  # Python would take what only VTK's objects know of for garbage, and call what is left of it
+kept = []  # keeps objects that only VTK refers to, because Python would collect them
 
 
 def leave(name, text):
-    """Whole or not at all."""
+    """Writes a file whole or not at all."""
     path = os.path.join(OUTPUT, name)
     with open(path + ".new", "w") as file:
         file.write(text)
@@ -17,7 +17,7 @@ def leave(name, text):
 
 
 def answer(interactor, names):
-    """From now on the file "do" has an expression of the names, "done" gets what comes of it."""
+    """From now on, evaluates the expression in the file "do", and writes the result to "done"."""
     def obey(*_):
         path = os.path.join(OUTPUT, "do")
         if not os.path.exists(path):

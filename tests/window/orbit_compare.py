@@ -35,7 +35,7 @@ check(note["representations"] == ["VDI"], "what was opened is shown as a VDI")
 # A slow machine makes few of them in a drag of 1.5 s.
 check(opened or note["interactive frames"] > 1, "there are frames while the mouse moves")
 
-# Where the view is on the screen is unknown: where its picture fits best.
+# The view's place on the screen is unknown; its picture fits best there.
 screen = pvtest.read_png(sys.argv[1]).astype(float).mean(axis=2)
 view = seen.astype(float).mean(axis=2)
 freedom = (screen.shape[0] - view.shape[0] + 1, screen.shape[1] - view.shape[1] + 1)
@@ -43,7 +43,7 @@ check(min(freedom) > 0, "the view fits the screen")
 
 
 def correlation(picture, pattern):
-    """At each place of the pattern."""
+    """The correlation at each place of the pattern."""
     transform = np.fft.rfft2(picture) * np.conj(np.fft.rfft2(pattern, picture.shape))
     return np.fft.irfft2(transform, picture.shape)[:freedom[0], :freedom[1]]
 

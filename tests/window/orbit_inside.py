@@ -216,7 +216,7 @@ def show_in_two_views():
 
 
 def values_of(image):
-    """Which values its output has: each making makes new ones."""
+    """Identifies the output's values, which are new each time the VDI is made."""
     array = image.GetClientSideObject().GetOutputDataObject(0).GetPointData().GetArray(0)
     return array.__this__ if array else ""
 
@@ -248,7 +248,7 @@ def activate(index):
 
 
 def makings_from(index):
-    """How often the VDI has been made, if it's from that view by now; 0 otherwise."""
+    """The number of times that the VDI has been made, if it is from that view by now; otherwise 0."""
     wanted = shown["views"][index].GetActiveCamera().GetPosition()
     made = shown["vdi"].CameraPosition
     return 0 if is_held() or max(abs(a - b) for a, b in zip(wanted, made)) > 1e-6 else shown["makings"]

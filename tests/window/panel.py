@@ -55,7 +55,7 @@ def regenerate_before_apply(window):
 
 
 def estimates(window, begin):
-    """The line that the panel says of the VDI to come, and what another number of supersegments makes of it without Apply."""
+    """The panel's estimate of the next VDI, and its change with another number of supersegments, without Apply."""
     line = wait_for("estimate", lambda: window.text_that_begins(begin))
     window.enter("Supersegments", 50)
     more = wait_for("another estimate", lambda: window.text_that_begins(begin) not in (None, line)
@@ -102,7 +102,7 @@ def close_and_cancel(window, panel, below):
 
 
 def regenerate_in_2d(window):
-    """In 2-D mode, a line says why Regenerate can't work. It vanishes with that mode, and moves no widget."""
+    """In 2-D mode, a line says why Regenerate can't work. The line vanishes with that mode, and moves no widget."""
     place = window.find("Auto", "check box").box
     window.click("Change Interaction Mode")
     window.click("Regenerate From This View")

@@ -27,7 +27,7 @@ PLUGIN_TESTS = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__fi
 sys.path.append(PLUGIN_TESTS)
 import server  # noqa: E402
 
-SECONDS = 20.0  # that a widget may take to show up
+SECONDS = 20.0  # limit for a widget to appear
 COLOR_EDITOR = "Color Map and Opacity of the VDI"  # its title
 DOCKS = ("frame", "panel")  # roles of dock widgets: the one up to Qt 6.8, and the one that forky's Qt has
 
@@ -170,7 +170,7 @@ class Bus:
 
 
 class Widget:
-    """One widget as AT-SPI describes it. Everything is asked anew."""
+    """One widget as AT-SPI describes it. Each property is queried anew."""
 
     SHOWING, ENABLED = 25, 8  # bits of its state
 
@@ -275,8 +275,8 @@ class Window:
         environment = dict(self.session.environment, HOME=home, QT_LINUX_ACCESSIBILITY_ALWAYS_ON="1", LC_ALL="C.UTF-8")
         environment.pop("PV_PLUGIN_CONFIG_FILE", None)  # ParaView loads at once what is named there
         if sys.version_info >= (3, 13):
-            # With that Python, Debian's ParaView 5.13 ends with a fault where its Script Editor finds pygments, but not the
-            # formatter of its own that isn't a part of it.
+            # With that Python, Debian's ParaView 5.13 crashes if its Script Editor finds pygments, but not ParaView's
+            # own formatter for pygments.
             with open(os.path.join(home, "pygments.py"), "w") as file:
                 file.write("raise ImportError\n")
             environment["PYTHONPATH"] = home
@@ -331,7 +331,7 @@ class Window:
     # Finding widgets
 
     def widgets(self, node=None, hidden=False):
-        """All that are visible, outermost first; `hidden`: the others as well."""
+        """All visible widgets, outermost first; with `hidden`, the others as well."""
         try:
             children = (node or self.root).children()
         except GLib.Error:  # it went while it was looked at
@@ -340,7 +340,7 @@ class Window:
             try:
                 if node is not None and not hidden and not child.has(Widget.SHOWING):
                     continue
-                # Nothing to be clicked, and there are many of them.
+                # Closed boxes and docks have many children, none of which can be clicked.
                 closed = not hidden and (child.role == "combo box" or child.role in DOCKS and child.box[0] < -100)
             except GLib.Error:
                 continue
@@ -424,7 +424,7 @@ class Window:
         wait_for("VDI", lambda: not self.is_making(panel), seconds)
 
     def show_wavelet(self):
-        """As a volume."""
+        """Shows a wavelet as a volume."""
         self.menu("Sources", "Alphabetical", "Wavelet")
         self.apply()
         self.choose("Outline", "Volume")
@@ -452,7 +452,7 @@ class Window:
         return self.text_that_begins("Making the VDI anew", panel) is not None
 
     def save(self, item, name, picture=None, extension=""):
-        """Saves by that item of the menu File. Without a server, `name` may be relative to the folder in which ParaView
+        """Saves by an item of the menu File. Without a server, `name` may be relative to the folder in which ParaView
         was started. `picture`: the name of a screenshot of the dialog. `extension`: the one that ParaView is to add."""
         self.menu("File", item)
         self.find("Files of type:")
@@ -478,7 +478,7 @@ class Window:
         self.key("Tab")
 
     def drag(self, start, end, button=1, steps=20, seconds=0.6, release=True):
-        """From one point of the screen to another; with `release` False the button stays down."""
+        """Drags from one point of the screen to another; with `release` False the button stays down."""
         xdotool("mousemove", str(start[0]), str(start[1]), "mousedown", str(button))
         for step in range(1, steps + 1):
             at = [round(a + (b - a) * step / steps) for a, b in zip(start, end)]
@@ -548,7 +548,8 @@ class Window:
         wait_for("end of the dialog", lambda: not self.has("Files of type:"))
 
     def load_plugin(self, path, picture=None):
-        """By Load New, on the server first where there is one; `picture`: the name of a screenshot of the dialog after that."""
+        """Loads the plugin by Load New, first on a server if there is one; `picture`: the name of a screenshot of the
+        dialog after that."""
         name = os.path.splitext(os.path.basename(path))[0]
         if not self.has("Plugin Manager", "dialog"):  # ParaView opens it where a server lacks the plugin
             self.menu("Tools", "Manage Plugins...")
@@ -574,7 +575,7 @@ class Window:
         self.close_dialog("Plugin Manager")
 
     def connect(self, name, port, plugin, picture=None):
-        """To a server of this computer, entered in the dialog, with the plugin on both sides; `picture`: the name of a
+        """Connects to a server of this computer, entered in the dialog, with the plugin on both sides; `picture`: the name of a
         screenshot of what is entered."""
         self.load_plugin(plugin)
         self.menu("File", "Connect...")

@@ -1,4 +1,4 @@
-/* A simulation in C: a slab of cells of the unit cube a rank, along x, and one step. Its argument is the
+/* A simulation in C: a slab of the unit cube's cells per rank, along x, and one step. Its argument is the
  * script. */
 #include <mpi.h>
 #include <stdio.h>
