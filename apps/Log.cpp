@@ -54,7 +54,8 @@ void addLog(CLI::App& app, Job& job) {
   command->footer(
       "Example:\n"
       "  vdi log run.jsonl\n"
-      "writes run.svg and prints the summary. The field 'log' of a vdi.json makes a run write such a log.");
+      "writes run.svg and prints the summary. The field 'log' of a vdi.json makes a run write such a log. "
+      "So does the variable VDI_LOG for a run with Catalyst scripts.");
   const auto options = std::make_shared<LogOptions>();
   command->add_option("log", options->input, "the log, of JSON lines")->type_name("FILE")->required();
   command->add_option("-o,--output", options->output, "the picture; default: the log's name with .svg")

@@ -10,20 +10,22 @@
 extern "C" {
 #endif
 
-/* One entry for each function of vdi_catalyst.h, with the same contract. Of the first four entries, the
- * engine for scripts has the first two, the engine for JSON runs the last two, and the isolated engine the
- * first three. These entries get a valid communicator, and a null *catalyst. In the isolated engine they
- * return VDI_CATALYST_NOT_ISOLATED, on all ranks, for a run that another engine has to carry out in this
- * process.
+/* One entry for each function of vdi_catalyst.h, with the same contract. Of the first five entries, the
+ * engine for scripts has the first three, the engine for JSON runs the last two, and the isolated engine the
+ * first two and initialize_json. These entries get a valid communicator, and a null *catalyst. In the
+ * isolated engine they return VDI_CATALYST_NOT_ISOLATED, on all ranks, for a run that another engine has to
+ * carry out in this process.
  *
- * `make_frames_of_json` is initialize_json in the processes that make an isolated run's frames. If `goes_on`,
- * earlier processes have made a part of the run, whose files stay. `set_clock`, which may be null, sets the
+ * `make_frames_of_pipelines` and `make_frames_of_json` are initialize_pipelines and initialize_json in the
+ * processes that make an isolated run's frames. If `goes_on`, earlier processes have made a part of the run,
+ * whose files stay. `set_clock`, which may be null, sets the
  * time, in seconds since the run's start, that counts for the next step. `log_left_out`, which may be null,
  * notes in the log, on the first rank, that the simulation didn't hand over a step, because two earlier
  * frames were still to be made. Neither is collective. */
 typedef struct vdi_catalyst_functions {
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**);
   int (*initialize_pipelines)(int32_t, int32_t, const vdi_catalyst_pipeline*, vdi_catalyst**);
+  int (*make_frames_of_pipelines)(int32_t, int32_t, const vdi_catalyst_pipeline*, vdi_catalyst**);
   int (*initialize_json)(int32_t, const char*, vdi_catalyst**);
   int (*make_frames_of_json)(int32_t, const char*, int goes_on, vdi_catalyst**);
   int (*set_blocks)(vdi_catalyst*, int32_t, const vdi_catalyst_block*);
@@ -43,14 +45,16 @@ typedef struct vdi_catalyst_functions {
 } vdi_catalyst_functions;
 
 /* An engine's only symbol. Its name contains the version, so a library of another version lacks it. */
-#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_8
-#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_8"
+#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_9
+#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_9"
 enum { VDI_CATALYST_NOT_ISOLATED = -1 };
 VDI_CATALYST_API extern const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS;
 
 /* libvdi_catalyst.so exports these for the program in which the isolated engine makes frames
- * (isolated/process). They call the JSON engine's entries of the same names, and the last two do nothing for
- * other runs. */
+ * (isolated/process). They call the engine's entries of the same names. */
+VDI_CATALYST_API int vdi_catalyst_make_frames_of_pipelines(int32_t fortran_communicator, int32_t script_count,
+                                                           const vdi_catalyst_pipeline* scripts,
+                                                           vdi_catalyst** catalyst);
 VDI_CATALYST_API int vdi_catalyst_make_frames_of_json(int32_t fortran_communicator, const char* json,
                                                       int goes_on, vdi_catalyst** catalyst);
 VDI_CATALYST_API void vdi_catalyst_set_clock(vdi_catalyst* catalyst, double seconds);

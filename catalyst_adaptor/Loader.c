@@ -120,7 +120,9 @@ typedef struct vdi_given {
   const vdi_catalyst_pipeline* pipelines;
   int32_t count;
   const char* json;
-  int kind; /* 0: scripts, 1: pipelines, 2: JSON, 3: JSON, frames made here, `count` is goes_on */
+  /* 0: scripts, 1: pipelines, 2: JSON; an isolated run's frames are made here, 3: of JSON, and `count` is
+   * goes_on, 4: of pipelines */
+  int kind;
 } vdi_given;
 
 static int initialize_with(const vdi_engine* engine, int32_t communicator, const vdi_given* given,
@@ -132,8 +134,11 @@ static int initialize_with(const vdi_engine* engine, int32_t communicator, const
       return engine->functions->initialize_pipelines(communicator, given->count, given->pipelines, catalyst);
     case 2:
       return engine->functions->initialize_json(communicator, given->json, catalyst);
-    default:
+    case 3:
       return engine->functions->make_frames_of_json(communicator, given->json, given->count, catalyst);
+    default:
+      return engine->functions->make_frames_of_pipelines(communicator, given->count, given->pipelines,
+                                                         catalyst);
   }
 }
 
@@ -201,6 +206,12 @@ int vdi_catalyst_make_frames_of_json(int32_t fortran_communicator, const char* j
                                      vdi_catalyst** catalyst) {
   const vdi_given given = {NULL, NULL, goes_on, json, 3};
   return initialize(fortran_communicator, &given, &json_run, catalyst);
+}
+
+int vdi_catalyst_make_frames_of_pipelines(int32_t fortran_communicator, int32_t script_count,
+                                          const vdi_catalyst_pipeline* scripts, vdi_catalyst** catalyst) {
+  const vdi_given given = {NULL, scripts, script_count, NULL, 4};
+  return initialize(fortran_communicator, &given, &script_run, catalyst);
 }
 
 /* The engine for this handle; null if none may be called. Without an engine there are no handles. */

@@ -223,6 +223,7 @@ using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable, parametersOf>;
 const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
     initialize,
     initializePipelines,
+    nullptr,
     initializeJson,
     nullptr,
     setBlocks,

@@ -203,6 +203,7 @@ using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable, parametersOf>;
 const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
     nullptr,
     nullptr,
+    nullptr,
     initializeJson,
     makeFramesOfJson,
     setBlocks,

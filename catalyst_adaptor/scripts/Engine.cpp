@@ -12,6 +12,7 @@
 #include <vtkObjectFactory.h>
 #include <vtkPVTrivialProducer.h>
 #include <vtkPythonInterpreter.h>
+#include <vtkSMProxyIterator.h>
 #include <vtkSMProxyManager.h>
 #include <vtkSMSessionProxyManager.h>
 #include <vtkSMSourceProxy.h>
@@ -21,8 +22,10 @@
 #include <algorithm>
 #include <atomic>
 #include <cassert>
+#include <chrono>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <regex>
 #include <stdexcept>
 #include <string_view>
@@ -32,6 +35,7 @@
 #include "catalyst_adaptor/scripts/Agreement.h"
 #include "plugin/VolumetricDepthImages/Filters/VDICollective.h"
 #include "plugin/VolumetricDepthImages/Filters/VDIParameters.h"
+#include "plugin/VolumetricDepthImages/Filters/VDIRecords.h"
 #include "plugin/VolumetricDepthImages/ParaViewVersions.h"
 
 namespace vdi::catalyst {
@@ -219,6 +223,83 @@ class ParaViewComm {
   MPI_Comm comm_ = MPI_COMM_NULL;
 };
 
+/// Collects the frames of a step from the events of filters and writers.
+class FrameCollector {
+ public:
+  void clear() {
+    frames_.clear();
+    failure_ = nullptr;
+  }
+
+  void add(const pv::FrameMade& made) noexcept {
+    using Clock = std::chrono::steady_clock;
+    if (made.reports.empty()) return;  // not the first rank
+    attempt([&] {
+      MadeFrame frame;
+      frame.filter = made.filter;
+      frame.begin = Clock::now() -
+                    std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(made.seconds));
+      frame.reports.assign(made.reports.begin(), made.reports.end());
+      frames_.push_back(std::move(frame));
+    });
+  }
+
+  /// Output of a frame that an earlier step has made isn't noted.
+  void add(const pv::OutputMade& output) noexcept {
+    const auto found = std::find_if(frames_.rbegin(), frames_.rend(), [&](const MadeFrame& frame) {
+      return output.filter == nullptr || frame.filter == output.filter;
+    });
+    if (found == frames_.rend()) return;
+    attempt([&] {
+      RankReport& report = found->reports.front();
+      report.outputSeconds += output.seconds;
+      found->dropped += output.dropped;
+      if (output.file.empty()) return;
+      std::error_code error;
+      const std::uintmax_t bytes = std::filesystem::file_size(output.file, error);
+      if (!error) report.bytesWritten += bytes;
+      found->files.push_back(output.file);
+    });
+  }
+
+  std::vector<MadeFrame> take() {
+    if (const std::exception_ptr failure = std::exchange(failure_, nullptr)) std::rethrow_exception(failure);
+    return std::exchange(frames_, {});
+  }
+
+ private:
+  /// VTK's methods, which call this, can't pass an exception on.
+  template <typename Work>
+  void attempt(Work work) noexcept {
+    try {
+      work();
+    } catch (...) {
+      failure_ = std::current_exception();
+    }
+  }
+
+  std::vector<MadeFrame> frames_;
+  std::exception_ptr failure_;
+};
+
+/// Names the frames' filters as the scripts do, if there are several.
+void nameFilters(std::vector<MadeFrame>& frames) {
+  vtkNew<vtkSMProxyIterator> sources;
+  sources->SetSessionProxyManager(vtkSMProxyManager::GetProxyManager()->GetActiveSessionProxyManager());
+  sources->SetModeToOneGroup();
+  int filters = 0;
+  for (sources->Begin("sources"); sources->IsAtEnd() == 0; sources->Next()) {
+    vtkSMProxy* proxy = sources->GetProxy();
+    if (std::string_view(proxy->GetXMLName()) != "VolumetricDepthImage") continue;
+    ++filters;
+    for (MadeFrame& frame : frames) {
+      if (frame.filter == proxy->GetClientSideObject()) frame.name = sources->GetKey();
+    }
+  }
+  if (filters > 1) return;
+  for (MadeFrame& frame : frames) frame.name.clear();
+}
+
 }  // namespace
 
 struct Engine::State {
@@ -232,6 +313,9 @@ struct Engine::State {
   Parameters parameters;
   vtkNew<vtkCallbackCommand> entry;
   vtkNew<vtkCallbackCommand> exchange;
+  FrameCollector frames;
+  vtkNew<vtkCallbackCommand> frameMade;
+  vtkNew<vtkCallbackCommand> outputMade;
   std::optional<Guard> guard;
   vtkSmartPointer<vtkSMSourceProxy> producer;
   std::vector<vtkSmartPointer<Pipeline>> prepared;
@@ -239,12 +323,12 @@ struct Engine::State {
 
   ~State() {
     producer = nullptr;
-    if (auto* controller = vtkMultiProcessController::GetGlobalController()) ignoreEntries(*controller);
+    if (auto* controller = vtkMultiProcessController::GetGlobalController()) ignorePlugin(*controller);
     if (comm && vtkInSituInitializationHelper::IsInitialized()) vtkInSituInitializationHelper::Finalize();
   }
   void start(int fortranCommunicator, const std::string& plugin);
-  void watchEntries();
-  void ignoreEntries(vtkMultiProcessController& controller);
+  void watchPlugin();
+  void ignorePlugin(vtkMultiProcessController& controller);
   std::optional<std::string> result(bool good);
 };
 
@@ -268,16 +352,16 @@ void Engine::State::start(int fortranCommunicator, const std::string& plugin) {
   vtkPythonInterpreter::Initialize(0);  // 0: the simulation keeps handling signals
   if (!guard) guard.emplace(*agreement, plugin);
   if (producer != nullptr) return;
-  watchEntries();
+  watchPlugin();
   producer.TakeReference(vtkSMSourceProxy::SafeDownCast(proxies->NewProxy("sources", "PVTrivialProducer")));
   producer->UpdateVTKObjects();
   Helper::SetProducer(channel, producer);
 }
 
-void Engine::State::watchEntries() {
+void Engine::State::watchPlugin() {
   auto* controller = vtkMultiProcessController::GetGlobalController();
   if (controller == nullptr) return;
-  ignoreEntries(*controller);  // a start that failed may have come this far
+  ignorePlugin(*controller);  // a start that failed may have come this far
   entry->SetClientData(&*agreement);
   entry->SetCallback([](vtkObject*, unsigned long, void* client, void* data) {
     auto& asked = *static_cast<pv::CollectiveEntry*>(data);
@@ -293,11 +377,22 @@ void Engine::State::watchEntries() {
       asked.parameters.push_back({one.name, one.isWhole, one.value, one.low, one.high});
   });
   controller->AddObserver(pv::ParameterExchange::event, exchange);
+  const auto collect = [&]<typename Data>(vtkCallbackCommand* command, const Data&) {
+    command->SetClientData(&frames);
+    command->SetCallback([](vtkObject*, unsigned long, void* client, void* data) {
+      static_cast<FrameCollector*>(client)->add(*static_cast<const Data*>(data));
+    });
+    controller->AddObserver(Data::event, command);
+  };
+  collect(frameMade, pv::FrameMade{});
+  collect(outputMade, pv::OutputMade{});
 }
 
-void Engine::State::ignoreEntries(vtkMultiProcessController& controller) {
+void Engine::State::ignorePlugin(vtkMultiProcessController& controller) {
   controller.RemoveObserver(entry);
   controller.RemoveObserver(exchange);
+  controller.RemoveObserver(frameMade);
+  controller.RemoveObserver(outputMade);
 }
 
 /// The result of the scripts that ran on this rank since the log was last read.
@@ -367,6 +462,12 @@ Parameters& Engine::parameters() {
   return state_->parameters;
 }
 
+std::vector<MadeFrame> Engine::takeFrames() {
+  std::vector<MadeFrame> frames = state_->frames.take();
+  if (!frames.empty()) nameFilters(frames);
+  return frames;
+}
+
 std::optional<std::string> Engine::finish() {
   state_->log->takeFirstError();
   bool good = true;
@@ -378,6 +479,7 @@ std::optional<std::string> Engine::finish() {
 std::optional<std::string> Engine::execute(vtkDataObject* grid, int step, double time) {
   using Helper = vtkInSituInitializationHelper;
   state_->log->takeFirstError();
+  state_->frames.clear();
   std::exception_ptr failure;
   bool good = true;
   try {

@@ -10,6 +10,7 @@
 
 #include "catalyst_adaptor/Parameters.h"
 #include "catalyst_adaptor/Scripts.h"
+#include "catalyst_adaptor/scripts/ScriptLog.h"
 
 class vtkDataObject;
 
@@ -59,6 +60,10 @@ class Engine {
   /// rank, else the reason of the failure here; that is "" if a script was stopped because of another rank.
   /// `step` >= 0.
   std::optional<std::string> execute(vtkDataObject* grid, int step, double time);
+
+  /// The frames that the last `execute` has made, on the first rank, in their order. Other ranks get none.
+  /// Not collective. Throws std::bad_alloc if there was no memory for one.
+  std::vector<MadeFrame> takeFrames();
 
   /// Runs the scripts' catalyst_finalize. Only the destructor may follow. Returns as `execute` does.
   std::optional<std::string> finish();

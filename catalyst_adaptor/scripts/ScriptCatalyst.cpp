@@ -2,8 +2,10 @@
 // blocks and arrays as a VtkGrid.
 #include <mpi.h>
 
+#include <chrono>
 #include <cstdint>
 #include <cstdio>
+#include <ctime>
 #include <memory>
 #include <optional>
 #include <span>
@@ -20,12 +22,15 @@
 #include "catalyst_adaptor/Scripts.h"
 #include "catalyst_adaptor/scripts/Engine.h"
 #include "catalyst_adaptor/scripts/ScriptEnvironment.h"
+#include "catalyst_adaptor/scripts/ScriptLog.h"
 #include "catalyst_adaptor/scripts/VtkGrid.h"
 
 struct vdi_catalyst : vdi::catalyst::FieldCalls {
   std::unique_ptr<vdi::catalyst::Engine> engine;
   std::unique_ptr<vdi::catalyst::VtkGrid> grid;           // null: no blocks were given
   std::optional<vdi::catalyst::DeviceDeposits> deposits;  // present once there are particles
+  bool isLogged = false;                                  // the same on all ranks
+  std::unique_ptr<vdi::catalyst::ScriptLog> log;          // the first rank's
 };
 
 namespace {
@@ -37,7 +42,9 @@ using vdi::catalyst::PythonLock;
 using vdi::catalyst::require;
 using vdi::catalyst::requireEqual;
 using vdi::catalyst::Script;
+using vdi::catalyst::ScriptLog;
 using vdi::catalyst::scriptsOf;
+using Clock = std::chrono::steady_clock;
 
 /// The living handle, of which a process has one at a time. Any other handle has been finalized, and must not
 /// be read.
@@ -86,6 +93,53 @@ void sayIfNothingIsMade(const vdi_catalyst& self, const std::vector<Script>& scr
     std::fprintf(stderr, "vdi_catalyst: no scripts were given, so no step will make anything\n");
 }
 
+/// The process that makes a run's frames: the simulation's, or a separate one.
+enum class Place { Simulation, Process };
+
+/// Opens the log that the first rank's VDI_LOG names.
+int openLog(vdi_catalyst& self, const std::vector<Script>& scripts, Place place) {
+  int rank = 0;
+  MPI_Comm_rank(self.comm, &rank);
+  const int code = guarded(self, VDI_CATALYST_SCRIPT, [&] {
+    if (rank != 0) return;
+    const std::optional<vdi::runlog::LogFiles> files = ScriptLog::filesFromEnvironment();
+    if (!files) return;
+    vdi::runlog::RunStart start;
+    start.unixTime = std::time(nullptr);
+    start.isIsolated = place == Place::Process;
+    MPI_Comm_size(self.comm, &start.ranks);
+    for (const Script& script : scripts) start.scripts.push_back(script.file);
+    self.log = std::make_unique<ScriptLog>(*files, start);
+  });
+  if (code != VDI_CATALYST_OK) return code;
+  int isLogged = self.log ? 1 : 0;
+  MPI_Bcast(&isLogged, 1, MPI_INT, 0, self.comm);
+  self.isLogged = isLogged != 0;
+  return code;
+}
+
+/// Collective: logs a step that has ended with `code` after this rank has waited for others. Returns the
+/// step's code: a line that can't be written fails a step.
+int logStep(vdi_catalyst& self, const ScriptLog::Step& step, double waitedMilliseconds, int code) {
+  double* const waits = self.log ? self.log->waits().data() : nullptr;
+  MPI_Gather(&waitedMilliseconds, 1, MPI_DOUBLE, waits, 1, MPI_DOUBLE, 0, self.comm);
+  if (code == VDI_CATALYST_OK) {
+    return guarded(
+        self, VDI_CATALYST_SCRIPT,
+        [&] {
+          if (self.log) self.log->add(step, self.engine->takeFrames(), "");
+        },
+        step.number);
+  }
+  if (!self.log) return code;
+  try {  // the step's own error stays the one that is reported
+    self.log->add(step, self.engine->takeFrames(), self.error);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "vdi_catalyst: step %lld: %s\n", static_cast<long long>(step.number), error.what());
+  }
+  return code;
+}
+
 /// Makes the arrays of all particles if a script will do anything at the step.
 int depositIfWanted(vdi_catalyst& self, std::int64_t step, double time) {
   if (self.fields.particles().empty()) return VDI_CATALYST_OK;
@@ -103,7 +157,7 @@ int depositIfWanted(vdi_catalyst& self, std::int64_t step, double time) {
 
 /// `given`: the files alone, or with arguments.
 template <typename Given>
-int initializeAny(int32_t fortran_communicator, int32_t script_count, const Given* given,
+int initializeAny(int32_t fortran_communicator, int32_t script_count, const Given* given, Place place,
                   vdi_catalyst** catalyst) {
   const PythonLock lock;
   // Loader.c has checked that MPI runs and that the handle is a communicator's, and *catalyst is null.
@@ -126,6 +180,7 @@ int initializeAny(int32_t fortran_communicator, int32_t script_count, const Give
   }
   if (code == VDI_CATALYST_OK)
     code = guarded(*self, VDI_CATALYST_ENGINE, [&] { self->engine->loadPlugin(); });
+  if (code == VDI_CATALYST_OK) code = openLog(*self, scripts, place);
   if (code == VDI_CATALYST_OK) code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { self->engine->add(); });
   if (code != VDI_CATALYST_OK) {
     if (self->engine) spareEngine() = self->engine.release();
@@ -139,12 +194,17 @@ int initializeAny(int32_t fortran_communicator, int32_t script_count, const Give
 
 int initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
                vdi_catalyst** catalyst) {
-  return initializeAny(fortran_communicator, script_count, scripts, catalyst);
+  return initializeAny(fortran_communicator, script_count, scripts, Place::Simulation, catalyst);
 }
 
 int initializePipelines(int32_t fortran_communicator, int32_t script_count,
                         const vdi_catalyst_pipeline* scripts, vdi_catalyst** catalyst) {
-  return initializeAny(fortran_communicator, script_count, scripts, catalyst);
+  return initializeAny(fortran_communicator, script_count, scripts, Place::Simulation, catalyst);
+}
+
+int makeFramesOfPipelines(int32_t fortran_communicator, int32_t script_count,
+                          const vdi_catalyst_pipeline* scripts, vdi_catalyst** catalyst) {
+  return initializeAny(fortran_communicator, script_count, scripts, Place::Process, catalyst);
 }
 
 int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
@@ -166,9 +226,22 @@ int wants(vdi_catalyst* catalyst, int64_t step, double time) {
   return wanted;
 }
 
+/// Runs the scripts on the step's values.
+int runScripts(vdi_catalyst& self, int64_t step, double time) {
+  int code = depositIfWanted(self, step, time);
+  if (code != VDI_CATALYST_OK) return code;
+  code = guarded(
+      self, VDI_CATALYST_ENGINE, [&] { self.grid->update(self.fields); }, step);
+  if (code != VDI_CATALYST_OK) return code;
+  return guarded(
+      self, VDI_CATALYST_SCRIPT,
+      [&] { return self.engine->execute(&self.grid->data(), static_cast<int>(step), time); }, step);
+}
+
 int execute(vdi_catalyst* catalyst, int64_t step, double time) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const PythonLock lock;
+  const auto begin = Clock::now();
   int code = guarded(
       *catalyst, VDI_CATALYST_BAD_ARGUMENT,
       [&] {
@@ -183,16 +256,21 @@ int execute(vdi_catalyst* catalyst, int64_t step, double time) {
         [&] { requireEqual(catalyst->comm, step, "the ranks give different steps"); }, step);
   }
   if (code != VDI_CATALYST_OK) return code;
-  code = depositIfWanted(*catalyst, step, time);
-  if (code != VDI_CATALYST_OK) return code;
-  code = guarded(
-      *catalyst, VDI_CATALYST_ENGINE, [&] { catalyst->grid->update(catalyst->fields); }, step);
-  if (code != VDI_CATALYST_OK) return code;
-  const int result = guarded(
-      *catalyst, VDI_CATALYST_SCRIPT,
-      [&] { return catalyst->engine->execute(&catalyst->grid->data(), static_cast<int>(step), time); }, step);
-  if (result == VDI_CATALYST_OK) catalyst->printed.clear();
-  return result;
+  // All ranks have met by now.
+  const std::chrono::duration<double, std::milli> waited = Clock::now() - begin;
+  code = runScripts(*catalyst, step, time);
+  if (catalyst->isLogged) code = logStep(*catalyst, {step, time, begin}, waited.count(), code);
+  if (code == VDI_CATALYST_OK) catalyst->printed.clear();
+  return code;
+}
+
+void logLeftOut(vdi_catalyst* catalyst, int64_t step, double time) {
+  if (!usable(catalyst) || !catalyst->log) return;
+  try {
+    catalyst->log->addLeftOut(step, time);
+  } catch (const std::exception& error) {  // the other ranks don't know of it, and no step fails
+    std::fprintf(stderr, "vdi_catalyst: step %lld: %s\n", static_cast<long long>(step), error.what());
+  }
 }
 
 vdi::catalyst::Parameters& parametersOf(vdi_catalyst& catalyst) {
@@ -204,6 +282,12 @@ int finalize(vdi_catalyst* catalyst) {
   const PythonLock lock;
   const std::unique_ptr<vdi_catalyst> self(std::exchange(alive(), nullptr));
   int code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { return self->engine->finish(); });
+  if (self->isLogged) {
+    const int logged = guarded(*self, VDI_CATALYST_ENGINE, [&] {
+      if (self->log) std::fprintf(stderr, "vdi_catalyst: %s\n", self->log->finish().c_str());
+    });
+    if (code == VDI_CATALYST_OK) code = logged;
+  }
   self->grid.reset();
   self->deposits.reset();
   const int ended = guarded(*self, VDI_CATALYST_ENGINE, [&] { self->engine.reset(); });
@@ -219,6 +303,7 @@ using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable, parametersOf, 
 const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
     initialize,
     initializePipelines,
+    makeFramesOfPipelines,
     nullptr,
     nullptr,
     setBlocks,
@@ -233,5 +318,5 @@ const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
     finalize,
     Entries::error,
     nullptr,
-    nullptr,
+    logLeftOut,
 };

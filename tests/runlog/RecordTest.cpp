@@ -63,7 +63,11 @@ TEST_CASE("a line of JSON keeps a record") {
   summary.add(failed);
   summary.seconds = 1.0;
   summary.isIsolated = GENERATE(false, true);
-  const runlog::RunStart start{"V", 4, 1700000000, summary.isIsolated};
+  runlog::RunStart start{"V", 4, 1700000000, summary.isIsolated};
+  if (GENERATE(false, true)) {
+    start.field.clear();
+    start.scripts = {"a/first.py", "second.py"};
+  }
   const std::string lines =
       jsonLine(start) + "\n" + jsonLine(frame()) + "\n" + jsonLine(failed) + "\n" + jsonLine(summary) + "\n";
   const RunRecords records = parseRecords(lines);

@@ -27,6 +27,9 @@ constexpr std::array variables{
                         "The command that starts these processes, instead of mpirun", true},
     EnvironmentVariable{"VDI_ISOLATION_PATIENCE", "a whole number of seconds, at least 0",
                         "The time that a simulation waits for a frame of these processes", true},
+    EnvironmentVariable{
+        "VDI_LOG", "a file, or two separated by ','",
+        "The log of a run with Catalyst scripts: JSON lines in a .jsonl file, text in another", true},
     EnvironmentVariable{"VDI_PLUGIN", "a file",
                         "The plugin that Catalyst scripts load, instead of the installed one", true},
     EnvironmentVariable{"VDI_RANKS_PER_HOST", "a whole number, at least 0; 0: the real number",

@@ -110,7 +110,7 @@ class Picture {
     std::string what = escaped(options_.title);
     if (!records_.starts.empty()) {
       const RunStart& start = records_.starts.back();
-      what += fmt::format("{}{}, {} rank{}", what.empty() ? "" : ": ", escaped(start.field), start.ranks,
+      what += fmt::format("{}{}, {} rank{}", what.empty() ? "" : ": ", escaped(subjectOf(start)), start.ranks,
                           start.ranks == 1 ? "" : "s");
     }
     std::string out = fmt::format("<text x=\"{}\" y=\"22\" font-size=\"15\">{}</text>\n", left, what);

@@ -40,6 +40,12 @@ double rounded(double milliseconds) {
   return std::round(milliseconds * millisecondsPerSecond) / millisecondsPerSecond;
 }
 
+std::string listOf(const std::vector<std::string>& texts) {
+  std::vector<std::string> items;
+  for (const std::string& text : texts) items.push_back(jsonOf(text));
+  return io::jsonListOf(items);
+}
+
 std::string stagesJson(const std::vector<StageTime>& times) {
   JsonObject object;
   for (const StageTime& stage : times) {
@@ -59,8 +65,16 @@ std::vector<StageTime> stagesFrom(const Json& object) {
 }
 
 RunStart startFrom(const Json& line) {
-  return {line.at("field").get<std::string>(), line.at("ranks").get<int>(),
-          line.at("unix_time").get<std::int64_t>(), line.value("isolated", false)};
+  RunStart start;
+  if (line.contains("scripts")) {
+    start.scripts = line.at("scripts").get<std::vector<std::string>>();
+  } else {
+    start.field = line.at("field").get<std::string>();
+  }
+  start.ranks = line.at("ranks").get<int>();
+  start.unixTime = line.at("unix_time").get<std::int64_t>();
+  start.isIsolated = line.value("isolated", false);
+  return start;
 }
 
 FrameRecord frameFrom(const Json& line) {
@@ -141,6 +155,14 @@ std::string onOneLine(std::string text) {
 
 }  // namespace
 
+std::string subjectOf(const RunStart& start) {
+  if (start.scripts.empty()) return start.field;
+  std::string names;
+  for (const std::string& script : start.scripts)
+    names += (names.empty() ? "" : ", ") + std::filesystem::path(script).filename().string();
+  return names;
+}
+
 StageTime stageOf(std::string name, std::span<const double> milliseconds) {
   StageTime time{std::move(name)};
   for (const double rank : milliseconds) {
@@ -188,7 +210,13 @@ void RunSummary::add(const FrameRecord& record) {
 
 std::string jsonLine(const RunStart& start) {
   JsonObject line;
-  line.add("event", jsonOf("start")).add("field", jsonOf(start.field)).add("ranks", jsonOf(start.ranks));
+  line.add("event", jsonOf("start"));
+  if (start.scripts.empty()) {
+    line.add("field", jsonOf(start.field));
+  } else {
+    line.add("scripts", listOf(start.scripts));
+  }
+  line.add("ranks", jsonOf(start.ranks));
   line.add("unix_time", jsonOf(start.unixTime));
   if (start.isIsolated) line.add("isolated", "true");
   return line.text();
@@ -205,9 +233,7 @@ std::string jsonLine(const FrameRecord& record) {
   line.add("device_bytes", jsonOf(record.deviceBytes));
   line.add("host_peak_bytes", jsonOf(record.hostPeakBytes));
   line.add("dropped", jsonOf(record.dropped));
-  std::vector<std::string> files;
-  for (const std::string& file : record.files) files.push_back(jsonOf(file));
-  line.add("files", io::jsonListOf(files));
+  line.add("files", listOf(record.files));
   if (!record.error.empty()) line.add("error", jsonOf(record.error));
   return line.text();
 }
@@ -244,7 +270,7 @@ std::string textLine(const RunStart& start) {
   if (::gmtime_r(&seconds, &parts) != nullptr)
     (void)std::strftime(when.data(), when.size(), "%Y-%m-%d %H:%M:%S", &parts);
   return fmt::format("run of {}, {} rank{}, {} UTC; ms of the slowest rank (of the mean rank)",
-                     onOneLine(start.field), start.ranks, start.ranks == 1 ? "" : "s", when.data());
+                     onOneLine(subjectOf(start)), start.ranks, start.ranks == 1 ? "" : "s", when.data());
 }
 
 std::string textLine(const FrameRecord& record) {

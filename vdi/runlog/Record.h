@@ -30,17 +30,21 @@ std::vector<StageTime> stagesOf(std::span<const RankReport> reports);
 
 /// The beginning of a run.
 struct RunStart {
-  std::string field;
+  std::string field;  // the array that a run without scripts shows
   int ranks = 1;
   std::int64_t unixTime = 0;  // seconds
   bool isIsolated = false;    // other processes make the frames; times are theirs, not the simulation's
+  std::vector<std::string> scripts = {};  // the files of a run with scripts
   bool operator==(const RunStart&) const = default;
 };
+
+/// The field or the names of the scripts, for people.
+std::string subjectOf(const RunStart& start);
 
 struct FrameRecord {
   std::int64_t step = 0;
   double time = 0.0;
-  std::string camera;               // empty: the run's only one
+  std::string camera;               // or the name of the script's filter; empty: the run's only one
   double milliseconds = 0.0;        // duration of the frame on the first rank
   std::vector<StageTime> stages;    // of a failed frame: none
   std::uint64_t bytesWritten = 0;   // into files

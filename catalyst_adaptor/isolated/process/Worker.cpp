@@ -77,8 +77,8 @@ class Worker {
       for (const std::string& argument : script.arguments) own.push_back(argument.c_str());
       pipelines.push_back({script.file.c_str(), static_cast<std::int32_t>(own.size()), own.data()});
     }
-    return vdi_catalyst_initialize_pipelines(comm, static_cast<std::int32_t>(pipelines.size()),
-                                             pipelines.data(), &catalyst_);
+    return vdi_catalyst_make_frames_of_pipelines(comm, static_cast<std::int32_t>(pipelines.size()),
+                                                 pipelines.data(), &catalyst_);
   }
 
   void logLeftOut(Socket::Received& received) {

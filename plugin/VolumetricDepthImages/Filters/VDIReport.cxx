@@ -1,14 +1,25 @@
 #include "VDIReport.h"
 
 #include <fmt/format.h>
+#include <vtkAlgorithm.h>
 #include <vtkDataArray.h>
 #include <vtkFieldData.h>
 #include <vtkImageData.h>
+#include <vtkMultiProcessController.h>
 
 #include <algorithm>
 #include <cstdint>
 
 namespace pv {
+
+namespace {
+
+void invoke(unsigned long event, void* data) {
+  if (auto* controller = vtkMultiProcessController::GetGlobalController())
+    controller->InvokeEvent(event, data);
+}
+
+}  // namespace
 
 std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::string& device) {
   if (reports.empty()) return {};
@@ -46,6 +57,19 @@ std::optional<vdi::MadeVdi> madeOf(vtkImageData* image, const vdi::GenerateSetti
         std::max(made.listSeconds, report.distributeSeconds + report.compositeSeconds + report.gatherSeconds);
   }
   return made;
+}
+
+void noteFrame(const FrameMade& frame) {
+  FrameMade data = frame;
+  invoke(FrameMade::event, &data);
+}
+
+void noteOutput(vtkAlgorithm* writer, OutputMade output) {
+  vtkAlgorithm* upstream = writer;
+  while (upstream != nullptr && upstream->IsA("vtkVDIGenerator") == 0)
+    upstream = upstream->GetTotalNumberOfInputConnections() > 0 ? upstream->GetInputAlgorithm() : nullptr;
+  output.filter = static_cast<vtkObjectBase*>(upstream);
+  invoke(OutputMade::event, &output);
 }
 
 }  // namespace pv

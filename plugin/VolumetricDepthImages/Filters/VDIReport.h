@@ -1,4 +1,4 @@
-// A filter's report about its last VDI.
+// The reports of filters and writers about what they have made.
 #ifndef VDIReport_h
 #define VDIReport_h
 
@@ -6,9 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "VDIRecords.h"
 #include "vdi/core/Estimate.h"
 #include "vdi/pipeline/Reports.h"
 
+class vtkAlgorithm;
 class vtkImageData;
 
 namespace pv {
@@ -19,6 +21,10 @@ std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::str
 /// Nullopt for an image without a VDI, and without reports.
 std::optional<vdi::MadeVdi> madeOf(vtkImageData* image, const vdi::GenerateSettings& settings,
                                    const std::vector<vdi::RankReport>& reports);
+
+/// Invoke the events of VDIRecords.h. The second one fills in the filter upstream of the writer.
+void noteFrame(const FrameMade& frame);
+void noteOutput(vtkAlgorithm* writer, OutputMade output);
 
 }  // namespace pv
 

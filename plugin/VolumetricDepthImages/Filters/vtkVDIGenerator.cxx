@@ -347,6 +347,7 @@ bool isCancellation(const std::exception_ptr& failure) {
 
 int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
                                  vtkInformationVector* outputs) {
+  const auto start = std::chrono::steady_clock::now();
   vtkDataObject* input = vtkDataObject::GetData(inputs[0]);
   vtkImageData* output = vtkImageData::GetData(outputs);
   output->Initialize();
@@ -405,6 +406,8 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   if (const auto made = pv::madeOf(output, this->CurrentSettings(), this->Internal->Reports))
     std::ranges::copy(pv::numbersOf(*made), this->LastVdi);
   regeneration.finish(output, origin, this->CurrentMTime());  // the time has grown: a map has built its table
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+  pv::noteFrame({static_cast<vtkObjectBase*>(this), spent.count(), this->Internal->Reports});
   return 1;
 }
 

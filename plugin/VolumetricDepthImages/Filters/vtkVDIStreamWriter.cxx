@@ -6,12 +6,14 @@
 #include <vtkInformation.h>
 #include <vtkObjectFactory.h>
 
+#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <string>
 #include <utility>
 
 #include "VDIImageData.h"
+#include "VDIReport.h"
 #include "vdi/core/Error.h"
 #include "vdi/page/Page.h"
 #include "vdi/stream/GivenToken.h"
@@ -107,6 +109,7 @@ void vtkVDIStreamWriter::SetControls(const vdi::stream::Controls& controls) {
 }
 
 void vtkVDIStreamWriter::WriteData() {
+  const auto start = std::chrono::steady_clock::now();
   try {
     auto* image = vtkImageData::SafeDownCast(this->GetInput());
     auto vdi = std::make_shared<vdi::Vdi>();
@@ -117,6 +120,8 @@ void vtkVDIStreamWriter::WriteData() {
     if (this->TimeStep >= 0) vdi->timeStep = static_cast<std::uint64_t>(this->TimeStep);
     if (!this->Running) this->Start();
     this->Running->Publisher.publish(std::move(vdi));
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+    pv::noteOutput(this, {.seconds = spent.count(), .dropped = this->Running->Publisher.dropped()});
     const std::string trouble = this->Running->Publisher.trouble();
     if (trouble != this->Running->Told) {
       this->Running->Told = trouble;

@@ -7,12 +7,14 @@
 
 #include <algorithm>
 #include <cctype>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "VDIImageData.h"
+#include "VDIReport.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Image.h"
 #include "vdi/io/Png.h"
@@ -67,18 +69,21 @@ void vtkVDIWriter::WriteData() {
       throw vdi::Error(vdi::ErrorCode::Io,
                        "no file name was given, or its pattern has a {field} without a value");
     }
+    const auto start = std::chrono::steady_clock::now();
     const std::filesystem::path path(this->FileName);
     if (extensionOf(path) == ".png") {
       const glm::vec3 background(this->Background[0], this->Background[1], this->Background[2]);
       vdi::io::writePng(path, vdi::io::toPicture(pv::pictureIn(image), background));
-      return;
+    } else {
+      vdi::Vdi vdi;
+      if (!pv::getVdi(image, vdi)) {
+        throw vdi::Error(vdi::ErrorCode::InvalidArgument, pv::noVdi);
+      }
+      if (this->TimeStep >= 0) vdi.timeStep = static_cast<std::uint64_t>(this->TimeStep);
+      write(path, vdi);
     }
-    vdi::Vdi vdi;
-    if (!pv::getVdi(image, vdi)) {
-      throw vdi::Error(vdi::ErrorCode::InvalidArgument, pv::noVdi);
-    }
-    if (this->TimeStep >= 0) vdi.timeStep = static_cast<std::uint64_t>(this->TimeStep);
-    write(path, vdi);
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
+    pv::noteOutput(this, {.seconds = spent.count(), .file = path.string()});
   } catch (const std::exception& error) {
     this->SetErrorCode(vtkErrorCode::CannotOpenFileError);
     vtkErrorMacro(<< error.what());
