@@ -145,18 +145,28 @@ class SocketConnection : public Connection, public std::enable_shared_from_this<
         self->end();
         return;
       }
-      const auto data = self->buffer_.cdata();
-      if (self->socket_.got_text()) {
-        self->viewer_->receive({static_cast<const char*>(data.data()), data.size()}, Clock::now());
-      } else {
-        self->viewer_->refuse(Close::BadMessage, "a viewer's messages are text");
+      try {
+        self->receive();
+      } catch (const std::exception&) {  // without memory, this connection alone is lost
+        self->end();
+        throw;
       }
-      self->buffer_.consume(data.size());
-      self->pump();
-      // async_close reads what is left by itself. Another read beside it might never end.
-      const bool isClosing = self->isWriting_ && std::holds_alternative<Viewer::Farewell>(self->outgoing_);
-      if (!isClosing) self->listen();
     });
+  }
+
+  /// Handles the message in the buffer.
+  void receive() {
+    const auto data = buffer_.cdata();
+    if (socket_.got_text()) {
+      viewer_->receive({static_cast<const char*>(data.data()), data.size()}, Clock::now());
+    } else {
+      viewer_->refuse(Close::BadMessage, "a viewer's messages are text");
+    }
+    buffer_.consume(data.size());
+    pump();
+    // async_close reads what is left by itself. Another read beside it might never end.
+    const bool isClosing = isWriting_ && std::holds_alternative<Viewer::Farewell>(outgoing_);
+    if (!isClosing) listen();
   }
 
   /// Call when the viewer is gone. Operations under way end with an error and then release this object.
@@ -166,12 +176,21 @@ class SocketConnection : public Connection, public std::enable_shared_from_this<
     viewer_->leave();
   }
 
-  /// Sends what there is to send, one message after the other.
-  void pump() {
+  /// Sends what there is to send, one message after the other. Never throws: the hub calls it for one viewer
+  /// after the other. Without memory, the connection is cut, and the read under way then ends it.
+  void pump() noexcept {
+    try {
+      sendNext();
+    } catch (const std::exception&) {
+      cut();
+    }
+  }
+
+  void sendNext() {
     if (hasEnded_) return;
     if (isWriting_) {
       // A level that can't be sent would block the reason for the disconnection, too.
-      if (viewer_->isStalled() && std::holds_alternative<Viewer::Binary>(outgoing_)) end();
+      if (viewer_->isStalled() && std::holds_alternative<Viewer::Binary>(outgoing_)) cut();
       return;
     }
     outgoing_ = viewer_->next(Clock::now());

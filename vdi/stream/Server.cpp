@@ -36,6 +36,7 @@ using asio::ip::tcp;
 
 constexpr std::chrono::seconds goodbyePatience{1};  // for goodbyes, and again after connections are cut
 constexpr std::chrono::milliseconds acceptPause{100};
+constexpr std::chrono::milliseconds failurePause{1};  // memory may be free by then
 
 std::string addressText(const std::string& host, std::uint16_t port) {
   const bool isV6 = host.find(':') != std::string::npos;
@@ -92,7 +93,11 @@ class Server::Impl {
   }
 
   ~Impl() {
-    asio::post(context_, [this] { finish(); });
+    try {
+      asio::post(context_, [this] { finish(); });
+    } catch (const std::exception&) {  // without memory, peers get no goodbye
+      context_.stop();
+    }
     thread_.join();
   }
   Impl(const Impl&) = delete;
@@ -115,7 +120,13 @@ class Server::Impl {
   Answer ask(const std::function<Answer()>& question) {
     std::promise<Answer> promise;
     std::future<Answer> answer = promise.get_future();
-    onThread([&] { promise.set_value(question()); });
+    onThread([&] {
+      try {
+        promise.set_value(question());
+      } catch (...) {
+        promise.set_exception(std::current_exception());
+      }
+    });
     return answer.get();
   }
 
@@ -182,6 +193,14 @@ class Server::Impl {
     });
   }
 
+  /// Call after an exception, which may have come before the server accepted the next peer.
+  void acceptAnew() {
+    if (!acceptor_.is_open()) return;
+    acceptor_.cancel();
+    pause_.cancel();
+    accept();
+  }
+
   void serve(Plain::socket_type socket) {
     if (isEnding_ || (connections_.size() >= options_.mostConnections && !makeRoom()))
       return;  // closes the socket
@@ -211,9 +230,17 @@ class Server::Impl {
     if (isEnding_ && connections_.empty()) stop();
   }
 
-  /// Tells each connection that the server ends. Cuts those that still exist after goodbyePatience.
   void finish() {
     isEnding_ = true;
+    try {
+      sayGoodbye();
+    } catch (const std::exception&) {  // without memory
+      context_.stop();
+    }
+  }
+
+  /// Tells each connection that the server ends. Cuts those that still exist after goodbyePatience.
+  void sayGoodbye() {
     boost::system::error_code ignored;
     acceptor_.close(ignored);
     pause_.cancel();
@@ -249,12 +276,16 @@ class Server::Impl {
   }
 
   void run() {
+    bool hasFailed = false;
     for (bool done = false; !done;) {
       try {
+        if (std::exchange(hasFailed, false)) acceptAnew();
         context_.run();
         done = true;
-      } catch (const std::exception& error) {  // from one connection, which is lost
+      } catch (const std::exception& error) {  // from one connection, which is lost, or for want of memory
+        hasFailed = true;
         say(error.what());
+        std::this_thread::sleep_for(failurePause);
       }
     }
   }

@@ -118,9 +118,10 @@ void Hub::setControls(Controls controls) {
 void Hub::endDrive() {
   Wish goOn;
   goOn.paused = false;
-  if (std::exchange(driverPaused_, false)) options_.steer(*driver_, goOn);
+  const std::uint32_t driver = *driver_;
   driver_.reset();
   ++steeringVersion_;
+  if (std::exchange(driverPaused_, false)) options_.steer(driver, goOn);
 }
 
 Viewer::Viewer(Hub& hub, std::function<void()> wake)
@@ -130,17 +131,24 @@ Viewer::~Viewer() {
   leave();
 }
 
-void Viewer::leave() {
+void Viewer::leave() noexcept {
   outbox_.close();
   announced_.reset();
   if (hub_.viewers_.erase(this) == 0) return;
-  if (hub_.driver_ == number_) hub_.endDrive();
+  try {
+    if (hub_.driver_ == number_) hub_.endDrive();
+  } catch (const std::exception&) {  // without memory, a paused simulation waits for the next driver
+  }
   hub_.wakeAll();
 }
 
 void Viewer::offer(const FramePtr& frame, Clock::time_point now) {
-  outbox_.offer(frame, now);
-  wake_();
+  try {
+    outbox_.offer(frame, now);
+    wake_();
+  } catch (const std::exception&) {  // other viewers get the frame
+    refuse(Close::Stalled, "no memory");
+  }
 }
 
 std::vector<std::shared_ptr<const EncodedLevel>> Viewer::held() const {

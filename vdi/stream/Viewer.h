@@ -92,7 +92,8 @@ class Hub {
 
 class Viewer {
  public:
-  /// `wake` is called whenever next() may have something new. The hub outlives the viewer.
+  /// `wake` is called whenever next() may have something new. It must not throw, nor let a viewer leave. The
+  /// hub outlives the viewer.
   Viewer(Hub& hub, std::function<void()> wake);
   ~Viewer();
   Viewer(const Viewer&) = delete;
@@ -104,7 +105,7 @@ class Viewer {
   void refuse(Close code, std::string cause);
   bool isWelcome() const { return isWelcome_; }
   /// Call when the viewer is gone; the hub forgets it.
-  void leave();
+  void leave() noexcept;
   /// Whether the viewer must be disconnected at once, even in the middle of a message.
   bool isStalled() const { return farewell_ && farewell_->code == Close::Stalled; }
 
