@@ -340,8 +340,11 @@ void addTypes(Node& mesh, std::size_t cells) {
   Node species = mesh["fields/species"];
   species["association"].set(std::string("element"));
   species["topology"].set(std::string("topo"));
-  for (int i = 0; i < speciesCount; ++i)
-    species["values"]["s" + std::to_string(i)].set(std::vector<conduit_float32>(cells));
+  for (int i = 0; i < speciesCount; ++i) {
+    std::string name = "s";
+    name += std::to_string(i);  // GCC 12 warns of an overlap in the sum of the two
+    species["values"][name].set(std::vector<conduit_float32>(cells));
+  }
 }
 
 void runCatalyst(Layout& layout, const std::string& run, const std::vector<std::string>& arguments,
