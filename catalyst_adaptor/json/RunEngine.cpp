@@ -92,7 +92,7 @@ struct RunEngine::State {
         comm(std::move(own)),
         mostDeviceBytes(static_cast<std::uint64_t>(run.maxDeviceMiB.value_or(0)) << 20),
         schedule(run),
-        budget(run.maxShare) {
+        wallTimeShare(run.maxShare) {
     if (run.when) measure.emplace(*run.when);
   }
 
@@ -124,7 +124,7 @@ struct RunEngine::State {
   std::optional<VdiGenerator> generator;
   std::unique_ptr<Deposits> deposits;
   config::Schedule schedule;
-  config::Budget budget;
+  config::WallTimeShare wallTimeShare;
   std::optional<Measure> measure;
   std::optional<double> meanNow;            // the mean that decided on this step
   std::optional<double> meanOfLast;         // the mean at the last frame
@@ -136,7 +136,7 @@ struct RunEngine::State {
   std::optional<double> firstUnitDistance;  // the opacities', unless the run has one
   std::optional<LoadedFrame> frame;         // the frame whose values the device has
   bool isAskedFor = false;                  // a viewer waits for a view, which the next step shows
-  bool hasToldOfBudget = false;
+  bool hasToldOfShare = false;
   std::optional<double> clock;  // the schedule's time in seconds, given for the next step
 };
 
@@ -215,7 +215,8 @@ bool RunEngine::isToBeMade(Fields& fields, std::int64_t step, double time) {
     // The ranks' sums may differ in their last bits.
     if (!state.asRootSays(holds)) return false;
   }
-  if (!state.budget.isLimited() || state.asRootSays(state.budget.hasRoom(state.elapsed()))) return true;
+  if (!state.wallTimeShare.isLimited() || state.asRootSays(state.wallTimeShare.hasRoom(state.elapsed())))
+    return true;
   leaveOut(step, time);
   return false;
 }
@@ -230,9 +231,9 @@ void RunEngine::leaveOut(std::int64_t step, double time) {
     if (!state.isRoot()) return;
     constexpr double percent = 100.0;
     const std::string cause =
-        fmt::format("frames have taken {:.3g} s of {:.3g} s, \"max_share\" is {:g} %", state.budget.spent(),
-                    state.elapsed(), percent * state.budget.share());
-    if (!std::exchange(state.hasToldOfBudget, true)) {
+        fmt::format("frames have taken {:.3g} s of {:.3g} s, \"max_share\" is {:g} %",
+                    state.wallTimeShare.spent(), state.elapsed(), percent * state.wallTimeShare.share());
+    if (!std::exchange(state.hasToldOfShare, true)) {
       fmt::print(stderr, "vdi_catalyst: step {}: left out: {}; {}\n", step, cause,
                  state.log ? "the log has all such steps" : "further such steps aren't reported");
     }
@@ -302,7 +303,7 @@ void RunEngine::makeAll(Fields& fields, std::int64_t step, double time, double w
     if (!first) first = failure;
     if (!state.frame || !isForFiles) break;  // other cameras would fail, too
   }
-  state.budget.spend(std::chrono::duration<double>(Clock::now() - begin).count());
+  state.wallTimeShare.spend(std::chrono::duration<double>(Clock::now() - begin).count());
   if (isForFiles && !first) state.meanOfLast = state.meanNow;
   try {
     state.comm.together([&] {

@@ -384,21 +384,21 @@ TEST_CASE("seconds count from the last frame, and any trigger will do") {
 }
 
 TEST_CASE("frames take their share of the time at most") {
-  config::Budget budget(0.1);
+  config::WallTimeShare share(0.1);
   double spent = 0.0;
   int made = 0;
   double now = 0.0;
   for (int step = 0; step < 1000; ++step) {
     now += 1.0;
-    if (!budget.hasRoom(now)) continue;
+    if (!share.hasRoom(now)) continue;
     const double cost = 3.0;
     now += cost;
     spent += cost;
-    budget.spend(cost);
+    share.spend(cost);
     if (++made > 1) CHECK(spent <= 0.1 * now);
   }
   CHECK(spent > 0.09 * now);
-  CHECK(config::Budget(std::nullopt).hasRoom(0.0));
+  CHECK(config::WallTimeShare(std::nullopt).hasRoom(0.0));
 }
 
 TEST_CASE("what is in the way of a run is named") {

@@ -1,4 +1,4 @@
-// The schedule of a run's frames, and the budget that its share of the wall time gives them.
+// The schedule of a run's frames, and the share of the wall time that they may take.
 #pragma once
 
 #include <cstdint>
@@ -40,9 +40,9 @@ class Schedule {
 
 /// Keeps the seconds that frames take below a share of the run's. A frame is left out unless there is room
 /// for one as long as the last. The first frame is always made.
-class Budget {
+class WallTimeShare {
  public:
-  explicit Budget(std::optional<double> share) : share_(share) {}
+  explicit WallTimeShare(std::optional<double> share) : share_(share) {}
   bool isLimited() const { return share_.has_value(); }
   /// `elapsed` is in seconds since the run's start.
   bool hasRoom(double elapsed) const { return !share_ || spent_ + last_ <= *share_ * (elapsed + last_); }
