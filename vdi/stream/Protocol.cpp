@@ -107,20 +107,9 @@ Json jsonOf(const Series& series) {
   return {{"times", std::move(times)}, {"steps", series.steps}};
 }
 
-const char* nameOf(Phase phase) {
-  switch (phase) {
-    case Phase::Waiting:
-      return "waiting";
-    case Phase::Live:
-      return "live";
-    default:
-      return "ended";
-  }
-}
-
 Phase phaseOf(const std::string& name) {
   for (const Phase phase : {Phase::Waiting, Phase::Live, Phase::Ended}) {
-    if (name == nameOf(phase)) return phase;
+    if (name == toString(phase)) return phase;
   }
   refuse("\"state\" is none of waiting, live and ended");
 }
@@ -167,7 +156,7 @@ Json jsonOf(const SeriesPart& part) {
   return message;
 }
 Json jsonOf(const State& state) {
-  Json message{{"type", "state"}, {"state", nameOf(state.phase)}, {"viewers", state.viewers}};
+  Json message{{"type", "state"}, {"state", toString(state.phase)}, {"viewers", state.viewers}};
   if (!state.cause.empty()) message["cause"] = state.cause;
   return message;
 }
@@ -258,6 +247,17 @@ Level levelIn(const Fields& fields) {
 }
 
 }  // namespace
+
+const char* toString(Phase phase) {
+  switch (phase) {
+    case Phase::Waiting:
+      return "waiting";
+    case Phase::Live:
+      return "live";
+    default:
+      return "ended";
+  }
+}
 
 std::string textOf(const FromViewer& message) {
   return dumped(message);

@@ -113,6 +113,7 @@ struct SeriesPart {
   bool operator==(const SeriesPart&) const = default;
 };
 enum class Phase { Waiting, Live, Ended };
+const char* toString(Phase phase);  // "waiting", "live", "ended"
 struct State {
   Phase phase = Phase::Waiting;
   std::uint32_t viewers = 0;

@@ -51,11 +51,6 @@ std::string nameInLinks(const std::string& host) {
   return ::gethostname(name.data(), name.size() - 1) == 0 ? std::string(name.data()) : host;
 }
 
-const char* phaseText(Phase phase) {
-  if (phase == Phase::Waiting) return "waiting";
-  return phase == Phase::Live ? "live" : "ended";
-}
-
 std::unique_ptr<asio::ssl::context> tlsContext(const ServerOptions& options) {
   if (options.certificate.empty() && options.key.empty()) return nullptr;
   if (options.certificate.empty() || options.key.empty())
@@ -148,7 +143,7 @@ class Server::Impl {
   std::string statusText() const {
     const ServerStatus now = statusNow();
     return nlohmann::json{{"session", now.session},
-                          {"state", phaseText(now.phase)},
+                          {"state", toString(now.phase)},
                           {"viewers", now.viewers},
                           {"frames", now.frames}}
         .dump();
