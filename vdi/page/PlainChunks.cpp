@@ -18,7 +18,6 @@ namespace vdi::page {
 namespace {
 
 // Places in the header (docs/format.md).
-constexpr std::size_t headerBytes = 240;
 constexpr std::size_t encodingAt = 16;
 constexpr std::size_t widthAt = 24;
 constexpr std::size_t heightAt = 28;
@@ -61,13 +60,13 @@ std::vector<std::byte> withPlainChunks(std::span<const std::byte> file) {
       std::uint64_t{numberAt<std::uint32_t>(file, widthAt)} * numberAt<std::uint32_t>(file, heightAt);
   const std::uint64_t perChunk = numberAt<std::uint32_t>(file, listsPerChunkAt);
   const std::size_t chunkCount = numberAt<std::uint32_t>(file, chunkCountAt);
-  const std::size_t dataAt = headerBytes + chunkCount * sizeof(io::ChunkEntry);
+  const std::size_t dataAt = io::fileHeaderBytes + chunkCount * sizeof(io::ChunkEntry);
 
   std::vector<std::byte> result(file.begin(), file.begin() + static_cast<std::ptrdiff_t>(dataAt));
   std::vector<std::byte> plain;
   std::size_t from = dataAt;
   for (std::size_t c = 0; c < chunkCount; ++c) {
-    const std::size_t entryAt = headerBytes + c * sizeof(io::ChunkEntry);
+    const std::size_t entryAt = io::fileHeaderBytes + c * sizeof(io::ChunkEntry);
     auto entry = numberAt<io::ChunkEntry>(file, entryAt);
     const std::uint64_t listCount = std::min(perChunk, lists - c * perChunk);
     plain.resize(chunkBytes(listCount, entry.supersegmentCount, precision));
@@ -88,7 +87,7 @@ std::vector<std::byte> withPlainChunks(std::span<const std::byte> file) {
   }
   setNumber(result, dataBytesAt, std::uint64_t{result.size() - dataAt});
   setNumber(result, tableChecksumAt,
-            std::uint64_t{XXH64(result.data() + headerBytes, dataAt - headerBytes, 0)});
+            std::uint64_t{XXH64(result.data() + io::fileHeaderBytes, dataAt - io::fileHeaderBytes, 0)});
   setNumber(result, headerChecksumAt, std::uint64_t{XXH64(result.data(), headerChecksumAt, 0)});
   result.insert(result.end(), file.begin() + static_cast<std::ptrdiff_t>(from), file.end());
   return result;
