@@ -456,10 +456,6 @@ void readSettings(const JsonValue& document, GenerateSettings& settings) {
   placed(document, [&] { validate(settings); });
 }
 
-}  // namespace
-
-namespace {
-
 /// The fields of the whole document.
 std::vector<std::string> documentFields() {
   std::vector<std::string> fields{"$schema",    "field",         "association", "component", "every",
