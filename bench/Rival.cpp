@@ -193,9 +193,8 @@ RivalFigures IcetRival::measure(ClockRaiser& clock, const FrameInput& input, int
 std::string rivalLine(const RivalFigures& figures) {
   constexpr double mebi = 1 << 20;
   std::string text = fmt::format(
-      "  rival icet: picture {:.3f} ms (ranks' own {:.3f}, IceT {:.3f}), sent {:.2f} MiB, differs by "
-      "{:.3f}/255 "
-      "at most",
+      "  rival icet: picture {:.3f} ms (ranks' own {:.3f}, IceT {:.3f}), sent {:.2f} MiB, "
+      "differs by {:.3f}/255 at most",
       figures.frame.median, figures.renderMs, figures.compositeMs,
       static_cast<double>(figures.bytesSent) / mebi, figures.maxDifference);
   if (figures.redistributeMs) {

@@ -26,9 +26,8 @@ std::string tableHead() {
 
 std::string tableLine(const BenchRow& row) {
   return fmt::format(
-      "{:<22} {:<9} {:>3} {:>4g} {:>5g} {:>9.3f} {:>9.3f} {:>6.2f} {:>9.3f} {:>6.2f} {:>9.3f} {:>7.4f} "
-      "{:>7.2f} "
-      "{:>8.4f} {:>8.2f}",
+      "{:<22} {:<9} {:>3} {:>4g} {:>5g} {:>9.3f} {:>9.3f} {:>6.2f} {:>9.3f} {:>6.2f} {:>9.3f} "
+      "{:>7.4f} {:>7.2f} {:>8.4f} {:>8.2f}",
       row.dataset, toString(row.settings.algorithm), row.settings.supersegments, row.viewDegrees,
       row.angleDegrees, row.dvr.device.median, row.generation.device.median, row.generation.overDvr.median,
       row.view.device.median, row.view.dvrOverDevice,

@@ -125,8 +125,7 @@ void addCamera(py::module_& module) {
            py::arg("position"), py::arg("focal_point"), py::arg("view_up") = Vector{0.0, 1.0, 0.0},
            py::arg("view_angle") = 30.0, py::arg("parallel_scale") = py::none(),
            "`view_angle` is vertical, in degrees. With `parallel_scale`, half the height of the picture in "
-           "world "
-           "units, the projection is parallel.")
+           "world units, the projection is parallel.")
       .def_property_readonly("position", [](const vdi::Camera& camera) { return toVector(camera.position); })
       .def_property_readonly("focal_point",
                              [](const vdi::Camera& camera) { return toVector(camera.focalPoint); })
