@@ -100,12 +100,13 @@ TEST_CASE("codes of codes are the same codes") {
 }
 
 TEST_CASE("depth codes: none for lattices that do not fit, separate samples in those that do") {
-  CHECK(depthCodeFor({1.0, 0.1, 8191}).step == 0.0F);
-  CHECK(depthCodeFor({1.0, 0.0, 0}).step == 0.0F);
+  CHECK(depthCodeFor({1.0, 0.1, 8191}) == DepthCode{});
+  CHECK(depthCodeFor({1.0, 0.0, 0}) == DepthCode{});
+  CHECK_FALSE(DepthCode{}.exists());
   for (const std::uint32_t count : {1U, 7U, 1000U, 8190U}) {
     const DepthLattice lattice{1.5, 0.25, count};
     const DepthCode own = depthCodeFor(lattice);
-    REQUIRE(own.step > 0.0F);
+    REQUIRE(own.exists());
     CHECK(own.step <= 0.125F);
     CHECK(own.depthOf(DepthCode::largest) >= static_cast<float>(lattice.frontOf(count)));
     const auto front = static_cast<float>(lattice.frontOf(count - 1));

@@ -56,22 +56,24 @@ struct CompactSupersegment {
 };
 static_assert(sizeof(CompactSupersegment) == 8);
 
-/// Code c means the depth first + c * step, computed in single precision.
+/// Code c means the depth first + c * step, computed in single precision. Compact lists have a depth code.
+/// For lists of full precision, there is none: all members are 0.
 struct DepthCode {
   static constexpr std::uint32_t largest = 16383;
   float first = 0.0F;
-  float step = 0.0F;  // > 0; 0: no code, as in a VDI of full precision
+  float step = 0.0F;  // > 0 where there is a code
+  bool exists() const { return step > 0.0F; }
   float depthOf(std::uint32_t code) const { return first + static_cast<float>(code) * step; }
   bool operator==(const DepthCode&) const = default;
 };
 
 /// The precision of lists with this depth code.
 inline Precision precisionOf(const DepthCode& code) {
-  return code.step > 0.0F ? Precision::Compact : Precision::Full;
+  return code.exists() ? Precision::Compact : Precision::Full;
 }
 
 /// The code for depths on the lattice. Its step divides a sample, so the lattice's depths have codes of their
-/// own. Its step is 0 (no code) for a lattice of more than 8190 samples.
+/// own. A lattice without samples, or of more than 8190, has no code.
 DepthCode depthCodeFor(const DepthLattice& lattice);
 
 /// Optical depth of codes 0 .. 4095: 2^-20 for code 0, then (2^(code * 16 / 4095) - 1) / 16. Steps are

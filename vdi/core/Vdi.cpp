@@ -68,7 +68,7 @@ void validateShape(const Vdi& vdi) {
                      vdi.height));
   }
   const DepthCode& code = vdi.depthCode;
-  const bool usable = code.step > 0.0F && code.first >= 0.0F &&
+  const bool usable = code.exists() && code.first >= 0.0F &&
                       std::isfinite(code.depthOf(DepthCode::largest)) &&
                       code.depthOf(DepthCode::largest) > code.depthOf(DepthCode::largest - 1);
   if (hasDepthCode(vdi.precision()) ? !usable : code != DepthCode{}) {

@@ -30,7 +30,7 @@ struct Vdi {
   double time = 0.0;         // simulation time, 0 when unknown
   std::uint64_t timeStep = 0;
   std::optional<Coloring> coloring;  // meaning of the colours, if known
-  DepthCode depthCode;               // code of compact lists; all 0 otherwise
+  DepthCode depthCode;               // code of compact lists; none otherwise
   AnyLists lists;                    // width * height lists
 
   /// Size of the requested picture: all lists but the margin's.

@@ -52,8 +52,9 @@ void requireTractable(const DepthLattice& lattice, const gpu::Device& device) {
   }
 }
 
-/// Whether depths of the settings' samples have codes (depthCodeFor), and the device can take them.
-bool hasDepthCode(const Scene& scene, const Camera& camera, const GenerateSettings& settings,
+/// Whether depths of the settings' samples have codes, which compact lists need, and the device can take the
+/// samples.
+bool canBeCompact(const Scene& scene, const Camera& camera, const GenerateSettings& settings,
                   const gpu::Device& device) {
   const DepthLattice lattice =
       depthLattice(scene, viewWithMargin(scene, camera, settings), settings.samplesPerVoxel);
@@ -62,7 +63,7 @@ bool hasDepthCode(const Scene& scene, const Camera& camera, const GenerateSettin
   } catch (const Error&) {
     return false;
   }
-  return depthCodeFor(lattice).step > 0.0F;
+  return depthCodeFor(lattice).exists();
 }
 
 /// The settings' rate, or the least power of two times it at which samples are slabs: only slabs show the
@@ -151,7 +152,7 @@ struct VdiGenerator::State {
         own.samplesPerVoxel = steps->samplingRate(table, settings.region);
       // The compact form matters more than extra samples.
       while (settings.samplesPerVoxel == automaticRate && own.samplesPerVoxel > 1.0 &&
-             !hasDepthCode(scene, camera, own, *device))
+             !canBeCompact(scene, camera, own, *device))
         own.samplesPerVoxel *= 0.5;
       if (settings.blending.mode == BlendMode::Isosurface)
         own.samplesPerVoxel = rateOfSlabs(scene, camera, own);
