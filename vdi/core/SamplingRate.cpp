@@ -46,6 +46,8 @@ Place placeOf(const Scene& scene, std::size_t index) {
   return {(share - 0.5) * scene.bounds.size(), scene.minSpacing * direction};
 }
 
+/// The trilinear value at a place, as in reference/Interpolation.cpp. Infinite values aren't replaced here:
+/// they make the result infinite or NaN, and showsEnough leaves out such probes.
 double interpolated(const Block& block, const glm::dvec3& world) {
   const IndexBox all = block.extended();
   const glm::dvec3 position =
