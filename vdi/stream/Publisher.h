@@ -43,8 +43,8 @@ class Publisher {
   Server& server_;
   std::uint32_t nextId_ = 0;  // only the thread uses it
 
-  mutable std::mutex mutex_;  // guards what follows
-  std::condition_variable changed_;
+  std::condition_variable changed_;  // signals that pending_ or isEnding_ has changed
+  mutable std::mutex mutex_;         // guards the next four members
   std::optional<Pending> pending_;
   std::uint64_t dropped_ = 0;
   std::string trouble_;
