@@ -15,7 +15,6 @@
 #include "vdi/core/Error.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/VdiFile.h"
-#include "vdi/io/VdiParts.h"
 
 namespace vdi::apps {
 
@@ -69,7 +68,6 @@ void FrameFiles::stop() {
 void FrameFiles::start(stream::Server& server) {
   server_ = &server;
   if (options_.folder.empty()) {
-    for (const std::filesystem::path& file : options_.files) (void)io::readVdiInfo(file);
     add(options_.files);
   } else {
     watch_.emplace(options_.folder);
@@ -145,10 +143,10 @@ void FrameFiles::tellIncomplete() {
 FrameFiles::Content FrameFiles::contentOf(const std::filesystem::path& file) {
   Content content;
   content.look = lookAt(file).value_or(FileLook());  // before reading, so that a later change shows
-  const Vdi header = io::readVdiInfo(file).header;
-  if (std::isfinite(header.time)) content.time = header.time;
-  content.step = header.timeStep;
-  content.header = io::InputFile(file).read(0, io::fileHeaderBytes);
+  const io::VdiFileInfo info = io::readVdiInfo(file);
+  if (std::isfinite(info.header.time)) content.time = info.header.time;
+  content.step = info.header.timeStep;
+  content.checksum = info.checksum;
   return content;
 }
 
@@ -157,19 +155,21 @@ FrameFiles::Entry* FrameFiles::entryWith(const std::filesystem::path& file, cons
   const auto found = latest_.find(file);
   if (found == latest_.end()) return nullptr;
   Entry& entry = series_[found->second];
-  const bool isSame = entry.content.look.size == content.look.size && entry.content.header == content.header;
+  const bool isSame =
+      entry.content.look.size == content.look.size && entry.content.checksum == content.checksum;
   return isSame ? &entry : nullptr;
 }
 
-/// Adds all files to the series and shows the last complete one.
+/// Adds all files to the series and shows the last complete one. Throws Error as io::readVdiInfo does for a
+/// bad file of a list; bad files of a folder are left out.
 void FrameFiles::add(const std::vector<std::filesystem::path>& files) {
   stream::Series entries;
   std::size_t unshown = series_.size();
   for (const std::filesystem::path& file : files) {
     try {
-      Content content = contentOf(file);
+      const Content content = contentOf(file);
       if (Entry* const same = follows() ? entryWith(file, content) : nullptr) {
-        same->content = std::move(content);
+        same->content = content;
         if (!same->isDamaged) {
           incomplete_.erase(file);
         } else if (same == &series_.back()) {
@@ -180,8 +180,9 @@ void FrameFiles::add(const std::vector<std::filesystem::path>& files) {
       entries.times.push_back(content.time);
       entries.steps.push_back(content.step);
       latest_[file] = static_cast<std::uint32_t>(series_.size());
-      series_.push_back({file, std::move(content)});
+      series_.push_back({file, content});
     } catch (const Error& error) {
+      if (!watch_) throw;
       leaveOut(file, error.what());
     }
   }
@@ -221,10 +222,10 @@ std::string FrameFiles::changeOf(Entry& entry) {
   const std::optional<FileLook> look = lookAt(entry.file);
   if (!look || *look == entry.content.look) return {};
   try {
-    Content content = contentOf(entry.file);
-    if (content.look.size != entry.content.look.size || content.header != entry.content.header)
+    const Content content = contentOf(entry.file);
+    if (content.look.size != entry.content.look.size || content.checksum != entry.content.checksum)
       return "the file was replaced";
-    entry.content = std::move(content);
+    entry.content = content;
     return {};
   } catch (const Error&) {
     return damagedOrGone;

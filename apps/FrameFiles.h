@@ -50,9 +50,7 @@ class FrameFiles {
  private:
   struct Content {
     FileLook look;
-    /// Distinguishes VDIs without their lists: the header has a checksum of the chunk table, which has the
-    /// checksums of all chunks.
-    std::vector<std::byte> header;
+    std::uint64_t checksum = 0;  // io::VdiFileInfo's, which distinguishes VDIs without their lists
     std::optional<double> time;
     std::uint64_t step = 0;
   };

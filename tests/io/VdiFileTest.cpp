@@ -410,6 +410,10 @@ TEST_CASE("info is known without the lists") {
   };
   requireGood(io::readVdiInfo(path));
   requireGood(io::decodeInfo(bytes));
+  Vdi other = vdi;  // differs in one list
+  std::get<SupersegmentLists>(other.lists).segments.back().opacity *= 0.5F;
+  CHECK(io::readVdiInfo(path).checksum == io::decodeInfo(bytes).checksum);
+  CHECK(io::decodeInfo(io::encode(other)).checksum != io::decodeInfo(bytes).checksum);
   bytes.back() ^= std::byte{1};  // within a list
   io::writeAtomically(path, bytes);
   requireGood(io::readVdiInfo(path));

@@ -160,6 +160,7 @@ VdiFileInfo infoOf(const Header& header, std::optional<Coloring> coloring, std::
   info.storedBytes = fileBytes;
   info.expandedBytes = bytesInMemory<std::uint64_t>(std::uint64_t{header.width} * header.height + 1,
                                                     header.supersegmentCount, precisionOf(header));
+  info.checksum = header.headerChecksum;
   return info;
 }
 

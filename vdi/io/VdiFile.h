@@ -17,6 +17,9 @@ struct VdiFileInfo {
   std::uint64_t supersegmentCount = 0;
   std::uint64_t storedBytes = 0;    // whole file
   std::uint64_t expandedBytes = 0;  // offsets and supersegments in memory
+  /// The header's checksum. Through that of the chunk table, it depends on the lists, too. The metadata have
+  /// their own.
+  std::uint64_t checksum = 0;
 };
 
 /// Encodes a VDI without loss in its precision, with LZ4 and checksums. Deterministic: equal VDIs give equal
