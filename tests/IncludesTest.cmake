@@ -111,12 +111,8 @@ foreach(file IN LISTS files)
   endforeach()
 endforeach()
 
-# No unit (a header and its source) may include itself by way of others of its folder. In the plugin's views, a
-# VDI's notices depend on the other VDIs in sight, so vtkVDIProp and VDINotices know each other.
+# No unit (a header and its source) may include itself by way of others of its folder.
 foreach(folder IN LISTS folders)
-  if(folder STREQUAL "${paraview}/Representations")
-    continue()
-  endif()
   list(REMOVE_DUPLICATES "units_of_${folder}")
   foreach(unit IN LISTS "units_of_${folder}")
     set(reached "${included_by_${unit}}")

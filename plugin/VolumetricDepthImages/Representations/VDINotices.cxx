@@ -11,7 +11,6 @@
 #include "VDIView.h"
 #include "vdi/core/Box.h"
 #include "vdi/core/Viewpoint.h"
-#include "vtkVDIProp.h"
 
 namespace pv {
 
@@ -44,24 +43,23 @@ std::optional<vdi::ViewpointIssue> issueOf(vtkProp* prop, const vdi::View& view)
 }
 
 /// Whether the view shows nothing but this VDI.
-bool isBlank(vtkRenderer* renderer, const vdi::View& view, vtkVDIProp* own) {
+bool isBlank(vtkRenderer* renderer, const vdi::View& view, vtkProp* own, const VDISightOf& sightOf) {
   return visitProps(renderer, [&](vtkProp* prop) {
     if (prop == own || prop->GetVisibility() == 0 || !prop->GetUseBounds()) return true;
-    auto* other = vtkVDIProp::SafeDownCast(prop);
-    if (other != nullptr && !other->IsShown()) return true;
-    const std::optional<vdi::ViewpointIssue> issue =
-        other != nullptr ? other->IssueIn(view) : issueOf(prop, view);
+    const std::optional<VDISight> other = sightOf(prop);
+    if (other && !other->isShown) return true;
+    const std::optional<vdi::ViewpointIssue> issue = other ? other->issue : issueOf(prop, view);
     return issue == vdi::ViewpointIssue::SeesNothing || issue == vdi::ViewpointIssue::FarAway;
   });
 }
 
 /// Whether no VDI before this one has the same issue.
-bool isFirst(vtkRenderer* renderer, const vdi::View& view, vtkVDIProp* own, vdi::ViewpointIssue issue) {
+bool isFirst(vtkRenderer* renderer, vtkProp* own, const VDISightOf& sightOf, vdi::ViewpointIssue issue) {
   bool isBefore = true;
   return visitProps(renderer, [&](vtkProp* prop) {
     isBefore = isBefore && prop != own;
-    auto* other = isBefore ? vtkVDIProp::SafeDownCast(prop) : nullptr;
-    return other == nullptr || other->IssueIn(view) != issue;
+    const std::optional<VDISight> other = isBefore ? sightOf(prop) : std::nullopt;
+    return !other || other->issue != issue;
   });
 }
 
@@ -77,16 +75,16 @@ void VDINotices::note(const std::string& text, vtkVDIMessage::Place place) {
   noticePlace_ = place;
 }
 
-void VDINotices::noteViewpoint(vtkRenderer* renderer, const vdi::View& view, vtkVDIProp* prop,
-                               bool isFiltered) {
-  const std::optional<vdi::ViewpointIssue> issue = prop->IssueIn(view);
-  if (!issue || !isFirst(renderer, view, prop, *issue)) return;
+void VDINotices::noteViewpoint(vtkRenderer* renderer, const vdi::View& view, vtkProp* prop,
+                               const VDISightOf& sightOf, bool isFiltered) {
+  const std::optional<vdi::ViewpointIssue> issue = sightOf(prop).value_or(VDISight()).issue;
+  if (!issue || !isFirst(renderer, prop, sightOf, *issue)) return;
   switch (*issue) {
     case vdi::ViewpointIssue::SeesNothing:
-      if (isBlank(renderer, view, prop)) this->note("The VDI is out of sight: press Reset Camera.");
+      if (isBlank(renderer, view, prop, sightOf)) this->note("The VDI is out of sight: press Reset Camera.");
       break;
     case vdi::ViewpointIssue::FarAway:
-      if (isBlank(renderer, view, prop))
+      if (isBlank(renderer, view, prop, sightOf))
         this->note("The VDI is too small to be seen from here: press Reset Camera.");
       break;
     case vdi::ViewpointIssue::Inside:
@@ -99,16 +97,15 @@ void VDINotices::noteViewpoint(vtkRenderer* renderer, const vdi::View& view, vtk
   }
 }
 
-void VDINotices::noteAngle(vtkRenderer* renderer, const vdi::View& view, vtkVDIProp* prop) {
-  const std::optional<double> own = prop->AngleIn(view);
+void VDINotices::noteAngle(vtkRenderer* renderer, vtkProp* prop, const VDISightOf& sightOf) {
+  const std::optional<double> own = sightOf(prop).value_or(VDISight()).angle;
   if (!own || *own <= vdi::besideDegrees) return;
   bool isAlone = true;
   bool isBefore = true;  // among VDIs at the same angle, the renderer's first one shows it
   const bool isFarthest = visitProps(renderer, [&](vtkProp* each) {
-    auto* other = vtkVDIProp::SafeDownCast(each);
-    isBefore = isBefore && other != prop;
-    const std::optional<double> angle =
-        other != nullptr && other != prop ? other->AngleIn(view) : std::nullopt;
+    isBefore = isBefore && each != prop;
+    const std::optional<VDISight> other = each != prop ? sightOf(each) : std::nullopt;
+    const std::optional<double> angle = other ? other->angle : std::nullopt;
     isAlone = isAlone && !angle;
     return !angle || (*angle <= *own && !(*angle == *own && isBefore));
   });

@@ -4,18 +4,30 @@
 
 #include <vtkNew.h>
 
+#include <functional>
+#include <optional>
 #include <string>
 
 #include "VDIMessage.h"
 
+class vtkProp;
 class vtkRenderer;
-class vtkVDIProp;
 
 namespace vdi {
 class View;
-}
+enum class ViewpointIssue;
+}  // namespace vdi
 
 namespace pv {
+
+/// What a view shows of one VDI.
+struct VDISight {
+  bool isShown = false;                      // whether the VDI can be seen at all
+  std::optional<vdi::ViewpointIssue> issue;  // of vtkVDIProp::IssueIn
+  std::optional<double> angle;               // of vtkVDIProp::AngleIn, degrees
+};
+/// Returns what the view shows of the prop's VDI; nullopt if the prop isn't a VDI.
+using VDISightOf = std::function<std::optional<VDISight>(vtkProp* prop)>;
 
 /// The texts of one VDI. An obstacle hides a problem, and a problem hides a notice.
 class VDINotices {
@@ -33,13 +45,14 @@ class VDINotices {
   /// Each frame begins without notices.
   void clear();
   void note(const std::string& text, vtkVDIMessage::Place place = vtkVDIMessage::Place::Middle);
-  /// Notes what is wrong with the VDI's viewpoint or with the view, unless another VDI of the renderer notes
-  /// it. Angles and cut edges aren't faults: a VDI with all of its scene looks right from all around.
-  /// `isFiltered`: the user can make the VDI anew.
-  void noteViewpoint(vtkRenderer* renderer, const vdi::View& view, vtkVDIProp* prop, bool isFiltered);
+  /// Notes what is wrong with the viewpoint of the prop's VDI or with the view, unless another VDI of the
+  /// renderer notes it. Angles and cut edges aren't faults: a VDI with all of its scene looks right from all
+  /// around. `isFiltered`: the user can make the VDI anew.
+  void noteViewpoint(vtkRenderer* renderer, const vdi::View& view, vtkProp* prop, const VDISightOf& sightOf,
+                     bool isFiltered);
   /// Notes how far the view is turned from the VDI's viewpoint. The VDI with the largest angle notes it for
   /// all VDIs of the renderer.
-  void noteAngle(vtkRenderer* renderer, const vdi::View& view, vtkVDIProp* prop);
+  void noteAngle(vtkRenderer* renderer, vtkProp* prop, const VDISightOf& sightOf);
 
   /// Shows the texts, or none.
   void show(bool isVisible);

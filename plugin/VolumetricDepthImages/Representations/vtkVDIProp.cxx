@@ -185,6 +185,11 @@ void vtkVDIProp::LookAround(vtkObject* renderer, unsigned long, void*) {
     return;
   }
   const std::optional<vdi::View> view = viewOf(own);
+  const auto sightOf = [&view](vtkProp* prop) -> std::optional<pv::VDISight> {
+    auto* vdi = vtkVDIProp::SafeDownCast(prop);
+    if (vdi == nullptr || !view) return std::nullopt;
+    return pv::VDISight{vdi->IsShown(), vdi->IssueIn(*view), vdi->AngleIn(*view)};
+  };
   if (internal.IsBeingMade || internal.HasJustCome) {
     internal.Notices.note("The VDI is being made.");
   } else if (internal.Buffers.isEmpty()) {
@@ -193,9 +198,9 @@ void vtkVDIProp::LookAround(vtkObject* renderer, unsigned long, void*) {
         "transparent.");
   } else if (view) {
     const bool isFiltered = internal.Piece != nullptr && pv::isFiltered(internal.Piece->GetFieldData());
-    internal.Notices.noteViewpoint(own, *view, this, isFiltered);
+    internal.Notices.noteViewpoint(own, *view, this, sightOf, isFiltered);
   }
-  if (view) internal.Notices.noteAngle(own, *view, this);
+  if (view) internal.Notices.noteAngle(own, this, sightOf);
   internal.Notices.show(true);
 }
 
