@@ -11,6 +11,8 @@
 #include <ctime>
 #include <exception>
 #include <filesystem>
+#include <fstream>
+#include <limits>
 #include <span>
 #include <string>
 #include <utility>
@@ -67,6 +69,22 @@ runlog::FrameRecord recordOf(std::int64_t step, double time, const config::RunCa
   return record;
 }
 
+/// The resident memory, shared memory included.
+config::HostMemoryBound::Use memoryOfThisProcess() {
+  const char* const path = "/proc/self/status";
+  config::HostMemoryBound::Use use;
+  std::ifstream file(path);
+  constexpr std::uint64_t kibibyte = 1024;
+  for (std::string name; file >> name;) {
+    std::uint64_t* const bytes = name == "VmRSS:" ? &use.now : name == "VmHWM:" ? &use.peak : nullptr;
+    std::uint64_t kibibytes = 0;
+    if (bytes != nullptr && file >> kibibytes) *bytes = kibibytes * kibibyte;
+    file.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+  }
+  if (use.now == 0) throw Error(ErrorCode::Io, "can't read the process's memory", path);
+  return use;
+}
+
 std::vector<const config::FilePattern*> patternsOf(const config::Run& run) {
   std::vector<const config::FilePattern*> patterns;
   if (run.vdi) patterns.push_back(&*run.vdi);
@@ -92,7 +110,8 @@ struct RunEngine::State {
         comm(std::move(own)),
         mostDeviceBytes(static_cast<std::uint64_t>(run.maxDeviceMiB.value_or(0)) << 20),
         schedule(run),
-        wallTimeShare(run.maxShare) {
+        wallTimeShare(run.maxShare),
+        hostMemory(run.maxHostMiB) {
     if (run.when) measure.emplace(*run.when);
   }
 
@@ -125,6 +144,7 @@ struct RunEngine::State {
   std::unique_ptr<Deposits> deposits;
   config::Schedule schedule;
   config::WallTimeShare wallTimeShare;
+  config::HostMemoryBound hostMemory;
   std::optional<Measure> measure;
   std::optional<double> meanNow;            // the mean that decided on this step
   std::optional<double> meanOfLast;         // the mean at the last frame
@@ -137,6 +157,7 @@ struct RunEngine::State {
   std::optional<LoadedFrame> frame;         // the frame whose values the device has
   bool isAskedFor = false;                  // a viewer waits for a view, which the next step shows
   bool hasToldOfShare = false;
+  bool hasToldOfMemory = false;
   std::optional<double> clock;  // the schedule's time in seconds, given for the next step
 };
 
@@ -198,7 +219,7 @@ void RunEngine::deposit(Fields& fields, const std::string& name, std::int64_t st
     state_->deposits->make(fields, name, step);
 }
 
-/// Whether the condition and the share of wall time let a due frame be made. Collective.
+/// Whether the condition, the share of wall time and the bound of memory let a due frame be made. Collective.
 bool RunEngine::isToBeMade(Fields& fields, std::int64_t step, double time) {
   State& state = *state_;
   if (state.measure) {
@@ -215,9 +236,40 @@ bool RunEngine::isToBeMade(Fields& fields, std::int64_t step, double time) {
     // The ranks' sums may differ in their last bits.
     if (!state.asRootSays(holds)) return false;
   }
-  if (!state.wallTimeShare.isLimited() || state.asRootSays(state.wallTimeShare.hasRoom(state.elapsed())))
-    return true;
-  leaveOut(step, time);
+  return hasWallTime(step, time) && hasHostMemory(step, time);
+}
+
+/// Leaves the step out if its frame could exceed the share of wall time. Collective.
+bool RunEngine::hasWallTime(std::int64_t step, double time) {
+  State& state = *state_;
+  const config::WallTimeShare& share = state.wallTimeShare;
+  if (!share.isLimited() || state.asRootSays(share.hasRoom(state.elapsed()))) return true;
+  leaveOut(step, time, state.hasToldOfShare, [&] {
+    constexpr double percent = 100.0;
+    return fmt::format("frames have taken {:.3g} s of {:.3g} s, \"max_share\" is {:g} %", share.spent(),
+                       state.elapsed(), percent * share.share());
+  });
+  return false;
+}
+
+/// Leaves the step out if its frame could exceed the bound of a process's memory on any rank. Then the memory
+/// of earlier frames is freed for the simulation. Collective.
+bool RunEngine::hasHostMemory(std::int64_t step, double time) {
+  State& state = *state_;
+  if (!state.hostMemory.isSet()) return true;
+  std::array<double, 1> most{};
+  state.comm.together([&] { most[0] = static_cast<double>(state.hostMemory.needed(memoryOfThisProcess())); });
+  state.comm.allReduceMax(most);
+  const auto needed = static_cast<std::uint64_t>(most[0]);
+  if (state.hostMemory.hasRoom(needed)) return true;
+  config::HostMemoryBound::Use before;
+  state.comm.together([&] { before = memoryOfThisProcess(); });
+  state.generator.reset();  // the next frame makes another one
+  state.comm.together([&] { state.hostMemory.free(before, memoryOfThisProcess()); });
+  leaveOut(step, time, state.hasToldOfMemory, [&] {
+    return fmt::format("a process would need {} MiB of memory, \"max_host_mib\" is {}", needed >> 20U,
+                       state.hostMemory.mebibytes());
+  });
   return false;
 }
 
@@ -225,15 +277,14 @@ void RunEngine::setClock(double seconds) {
   state_->clock = seconds;
 }
 
-void RunEngine::leaveOut(std::int64_t step, double time) {
+/// Logs a step that is left out. Rank 0 prints the first one for each kind of cause.
+void RunEngine::leaveOut(std::int64_t step, double time, bool& hasTold,
+                         FunctionRef<std::string()> causeText) {
   State& state = *state_;
   state.comm.together([&] {
     if (!state.isRoot()) return;
-    constexpr double percent = 100.0;
-    const std::string cause =
-        fmt::format("frames have taken {:.3g} s of {:.3g} s, \"max_share\" is {:g} %",
-                    state.wallTimeShare.spent(), state.elapsed(), percent * state.wallTimeShare.share());
-    if (!std::exchange(state.hasToldOfShare, true)) {
+    const std::string cause = causeText();
+    if (!std::exchange(hasTold, true)) {
       fmt::print(stderr, "vdi_catalyst: step {}: left out: {}; {}\n", step, cause,
                  state.log ? "the log has all such steps" : "further such steps aren't reported");
     }
@@ -278,6 +329,8 @@ void RunEngine::execute(Fields& fields, Parameters& parameters, std::int64_t ste
 void RunEngine::makeAll(Fields& fields, std::int64_t step, double time, double waited, bool isForFiles) {
   State& state = *state_;
   const auto begin = Clock::now();
+  config::HostMemoryBound::Use before;
+  if (state.hostMemory.isSet()) state.comm.together([&] { before = memoryOfThisProcess(); });
   std::vector<double> waits;
   if (run_.log.any()) waits = millisecondsOfRanks(waited);
   std::exception_ptr first;
@@ -304,6 +357,8 @@ void RunEngine::makeAll(Fields& fields, std::int64_t step, double time, double w
     if (!state.frame || !isForFiles) break;  // other cameras would fail, too
   }
   state.wallTimeShare.spend(std::chrono::duration<double>(Clock::now() - begin).count());
+  if (state.hostMemory.isSet())
+    state.comm.together([&] { state.hostMemory.spend(before, memoryOfThisProcess()); });
   if (isForFiles && !first) state.meanOfLast = state.meanNow;
   try {
     state.comm.together([&] {

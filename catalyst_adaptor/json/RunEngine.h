@@ -60,7 +60,9 @@ class RunEngine {
   bool isDue(std::int64_t step, double time);
   void deposit(Fields& fields, const std::string& name, std::int64_t step);
   bool isToBeMade(Fields& fields, std::int64_t step, double time);
-  void leaveOut(std::int64_t step, double time);
+  bool hasWallTime(std::int64_t step, double time);
+  bool hasHostMemory(std::int64_t step, double time);
+  void leaveOut(std::int64_t step, double time, bool& hasTold, FunctionRef<std::string()> causeText);
   void makeAll(Fields& fields, std::int64_t step, double time, double waited, bool isForFiles);
   void makeOne(Fields& fields, std::int64_t step, double time, const config::RunCamera& camera,
                bool isForFiles, runlog::FrameRecord& record);

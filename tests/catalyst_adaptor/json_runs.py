@@ -34,8 +34,8 @@ def refused(document, file):
     assert '"existing": "continue"' in lines[0] and '"existing": "overwrite"' in lines[0], lines
 
 
-def made(kind=".vdi"):
-    return sorted(name for name in os.listdir(".") if name.endswith(kind))
+def made(kind=".vdi", start=""):
+    return sorted(name for name in os.listdir(".") if name.endswith(kind) and name.startswith(start))
 
 
 def events(name="run.jsonl"):
@@ -182,6 +182,12 @@ def budget():
     assert less <= most << 20 < free, (less, most, free)
     assert open("less_0.vdi", "rb").read() == open("free_0.vdi", "rb").read()
     run({"output": "none_{timestep}.vdi", "max_device_mib": 1}, 3, said="MiB of the allowed 1 MiB are held here")
+    # Steps without memory are left out. The memory that is there suffices for all.
+    text = run({"output": "h_{timestep}.vdi", "max_host_mib": 1, "log": "host.jsonl"}, 0, 0, said="would need")
+    assert text.count("left out: a process") == 1 and made(".vdi", "h_") == [], text
+    assert [event["event"] for event in events("host.jsonl")] == ["start", "left_out", "left_out", "end"]
+    run({"output": "h_{timestep}.vdi", "max_host_mib": 1 << 20}, 0, 0)
+    assert len(made(".vdi", "h_")) == 2, made(".vdi", "h_")
 
 
 def full():

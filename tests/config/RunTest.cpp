@@ -157,7 +157,7 @@ TEST_CASE("everything at once") {
     "resolution": [320, 200], "supersegments": 12, "margin": 0.5, "sampling_rate": 2, "shade": true,
     "output": {"vdi": "a/{timestep}.vdi", "png": "b_{timestep:03d}.png", "cinema": "c.cdb", "latest": true},
     "when": {"mean": "p", "association": "cells", "component": 1, "above": -1, "below": 2},
-    "max_share": 0.05, "max_device_mib": 512, "existing": "continue", "isolation": {"restart": true, "patience": 20},
+    "max_share": 0.05, "max_device_mib": 512, "max_host_mib": 9000, "existing": "continue", "isolation": {"restart": true, "patience": 20},
     "log": {"json": "run.jsonl", "text": "run.log"},
     "stream": {"host": "::1", "port": 8080, "token_file": "t", "link_file": "l", "certificate": "c", "key": "k",
                "megabits": 100, "steer": true, "steering_log": "s"}})",
@@ -190,6 +190,7 @@ TEST_CASE("everything at once") {
   CHECK_FALSE(run.when->holds(2.0));
   CHECK(run.maxShare == 0.05);
   CHECK(run.maxDeviceMiB == 512);
+  CHECK(run.maxHostMiB == 9000);
   CHECK(run.existing == config::Existing::Continue);
   CHECK(run.isolation->restart);
   CHECK(run.isolation->patience == 20.0);
@@ -240,6 +241,7 @@ TEST_CASE("mistakes are told with their place") {
   refusedField(R"("max_share": 1.5)", "/max_share: is a share, 1 at most");
   refusedField(R"("max_share": 0)", "/max_share: must be > 0");
   refusedField(R"("max_device_mib": 0)", "/max_device_mib");
+  refusedField(R"("max_host_mib": 0)", "/max_host_mib");
   refusedField(R"("existing": "append")", "/existing: must be 'refuse', 'overwrite' or 'continue'");
   refusedField(R"("existing": true)", "/existing: must be a string");
   refusedField(R"("isolation": "thread")", "/isolation: must be 'process', or an object");
@@ -399,6 +401,24 @@ TEST_CASE("frames take their share of the time at most") {
   }
   CHECK(spent > 0.09 * now);
   CHECK(config::WallTimeShare(std::nullopt).hasRoom(0.0));
+}
+
+TEST_CASE("a frame that could exceed the bound of memory is left out") {
+  constexpr std::uint64_t mib = std::uint64_t{1} << 20U;
+  config::HostMemoryBound bound(100);
+  CHECK(bound.hasRoom(bound.needed({100 * mib, 300 * mib})));  // the peak of another time doesn't count
+  CHECK(!bound.hasRoom(bound.needed({100 * mib + 1, 0})));
+  // A frame uses 50 MiB, and 20 of these stay.
+  bound.spend({40 * mib, 50 * mib}, {60 * mib, 90 * mib});
+  CHECK(bound.needed({60 * mib, 90 * mib}) == 90 * mib);
+  CHECK(bound.needed({71 * mib, 90 * mib}) == 101 * mib);  // the simulation has grown by 11
+  // The most expensive frame counts. Without a new peak, only the memory that stays is known.
+  bound.spend({60 * mib, 90 * mib}, {65 * mib, 90 * mib});
+  CHECK(bound.needed({65 * mib, 90 * mib}) == 90 * mib);
+  bound.free({65 * mib, 90 * mib}, {41 * mib, 90 * mib});
+  CHECK(bound.needed({41 * mib, 90 * mib}) == 90 * mib);
+  CHECK(bound.needed({10 * mib, 90 * mib}) == 59 * mib);
+  CHECK(config::HostMemoryBound(std::nullopt).hasRoom(std::uint64_t{1} << 60U));
 }
 
 TEST_CASE("what is in the way of a run is named") {

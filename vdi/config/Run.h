@@ -104,6 +104,7 @@ struct Run {
   std::optional<RunCondition> when;
   std::optional<double> maxShare;            // share of the run's wall time that frames may take
   std::optional<std::int64_t> maxDeviceMiB;  // device memory that a rank may hold
+  std::optional<std::int64_t> maxHostMiB;    // host memory beyond which frames are left out
   Existing existing = Existing::Refuse;
   std::vector<RunCamera> cameras{{}};  // at least one; the first is the stream's
   RunColors colors;

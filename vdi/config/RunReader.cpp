@@ -262,6 +262,8 @@ void readTriggers(const JsonValue& document, Run& run) {
   constexpr std::int64_t mostMebibytes = std::int64_t{1} << 24;  // 16 TiB
   ifThere(document, "max_device_mib",
           [&](const JsonValue& value) { run.maxDeviceMiB = value.whole(1, mostMebibytes); });
+  ifThere(document, "max_host_mib",
+          [&](const JsonValue& value) { run.maxHostMiB = value.whole(1, mostMebibytes); });
 }
 
 Existing existingOf(const JsonValue& value) {
@@ -458,10 +460,10 @@ void readSettings(const JsonValue& document, GenerateSettings& settings) {
 
 /// The fields of the whole document.
 std::vector<std::string> documentFields() {
-  std::vector<std::string> fields{"$schema",    "field",         "association", "component", "every",
-                                  "every_time", "every_seconds", "when",        "max_share", "max_device_mib",
-                                  "existing",   "camera",        "cameras",     "orbit",     "colors",
-                                  "resolution", "output",        "stream",      "log",       "isolation"};
+  std::vector<std::string> fields{
+      "$schema", "field",     "association",    "component",    "every",    "every_time", "every_seconds",
+      "when",    "max_share", "max_device_mib", "max_host_mib", "existing", "camera",     "cameras",
+      "orbit",   "colors",    "resolution",     "output",       "stream",   "log",        "isolation"};
   for (const Setting& setting : settingsTable()) fields.emplace_back(setting.key);
   return fields;
 }

@@ -1,6 +1,7 @@
-// The schedule of a run's frames, and the share of the wall time that they may take.
+// The schedule of a run's frames, the share of the wall time that they may take, and the memory of a process.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 
@@ -57,6 +58,46 @@ class WallTimeShare {
   std::optional<double> share_;
   double spent_ = 0.0;
   double last_ = 0.0;
+};
+
+/// Keeps the memory of a process within a bound. A frame is left out if the process would need too much in
+/// case the frame uses as much as the most expensive one so far. Memory that earlier frames have left for
+/// later ones counts once.
+class HostMemoryBound {
+ public:
+  /// Bytes of host memory in use, and the most since the process's start.
+  struct Use {
+    std::uint64_t now = 0;
+    std::uint64_t peak = 0;
+  };
+  explicit HostMemoryBound(std::optional<std::int64_t> mebibytes) : mebibytes_(mebibytes) {}
+  bool isSet() const { return mebibytes_.has_value(); }
+  std::int64_t mebibytes() const { return mebibytes_.value_or(0); }
+  /// The bytes that the process would have in the next frame.
+  std::uint64_t needed(const Use& use) const { return std::max(use.now, withoutFrames(use) + mostUsed_); }
+  bool hasRoom(std::uint64_t needed) const {
+    return !mebibytes_ || needed <= static_cast<std::uint64_t>(*mebibytes_) << 20U;
+  }
+  /// Call after each frame. Within one, the peak is known only if it exceeds all earlier ones.
+  void spend(const Use& before, const Use& after) {
+    const std::uint64_t most = after.peak > before.peak ? after.peak : after.now;
+    const std::uint64_t others = withoutFrames(before);
+    mostUsed_ = std::max(mostUsed_, most - std::min(most, others));
+    keep(before, after);
+  }
+  /// Call when memory that frames have left has been freed.
+  void free(const Use& before, const Use& after) { keep(before, after); }
+
+ private:
+  std::uint64_t withoutFrames(const Use& use) const { return use.now - std::min(use.now, kept_); }
+  void keep(const Use& before, const Use& after) {
+    const std::uint64_t all = kept_ + after.now;
+    kept_ = all - std::min(all, before.now);
+  }
+
+  std::optional<std::int64_t> mebibytes_;
+  std::uint64_t mostUsed_ = 0;
+  std::uint64_t kept_ = 0;  // between frames, for later ones
 };
 
 }  // namespace vdi::config
