@@ -56,7 +56,7 @@ void StridedValues::copyTo(std::byte* to) const {
   const auto scalar = static_cast<std::int64_t>(scalarBytes);
   const ByteStrides from{strides[0], strides[1], strides[2]};
   glm::ivec3 size(counts[0], counts[1], counts[2]);
-  if (rowInOrder(*this)) {
+  if (rowInOrder(*this) && counts[0] * components <= std::numeric_limits<int>::max()) {
     size.x *= components;
     copyStrided(first, {scalar, from.y, from.z}, to, packedStrides(size, scalarBytes), size, scalarBytes);
     return;
