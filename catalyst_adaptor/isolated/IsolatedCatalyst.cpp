@@ -16,9 +16,9 @@
 #include "catalyst_adaptor/Parameters.h"
 #include "catalyst_adaptor/Scripts.h"
 #include "catalyst_adaptor/isolated/IsolatedRun.h"
-#include "vdi/config/Json.h"
 #include "vdi/config/Run.h"
 #include "vdi/core/Environment.h"
+#include "vdi/io/Json.h"
 
 struct vdi_catalyst : vdi::catalyst::FieldCalls {
   std::unique_ptr<vdi::catalyst::IsolatedRun> run;
@@ -110,7 +110,7 @@ class Decision {
   static std::optional<vdi::config::Run> readable(const char* json, std::string& text, std::string& name) {
     if (json == nullptr) return std::nullopt;
     try {
-      const vdi::config::JsonLimits limits;
+      const vdi::io::JsonLimits limits;
       vdi::config::RunText source = vdi::config::readRun({json, ::strnlen(json, limits.bytes + 1)});
       text = std::move(source.text);
       name = std::move(source.name);

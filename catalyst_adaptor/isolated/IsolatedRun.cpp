@@ -14,11 +14,11 @@
 #include <filesystem>
 #include <limits>
 #include <new>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
 #include "vdi/io/Files.h"
+#include "vdi/io/JsonText.h"
 
 namespace vdi::catalyst {
 
@@ -242,10 +242,11 @@ void IsolatedRun::tell(const Values& changes, const At& at) const {
     fmt::print(stderr, "vdi_catalyst: step {}: {} = {:g} from now on\n", at.step, name, value);
   const bool isLogged = options_.run && options_.run->stream && !options_.run->stream->steeringLog.empty();
   if (!isLogged) return;
-  nlohmann::ordered_json entry{{"step", at.step}};
-  entry["time"] = std::isfinite(at.time) ? nlohmann::ordered_json(at.time) : nlohmann::ordered_json();
-  entry["in_force"] = changes;
-  io::appendLine(options_.run->stream->steeringLog, entry.dump());
+  io::JsonObject inForce;
+  for (const auto& [name, value] : changes) inForce.add(name, io::jsonOf(value));
+  io::JsonObject entry;
+  entry.add("step", io::jsonOf(at.step)).add("time", io::jsonOf(at.time)).add("in_force", inForce.text());
+  io::appendLine(options_.run->stream->steeringLog, entry.text());
 }
 
 bool IsolatedRun::isLocallyWanted(std::int64_t step, double time, double now) const {

@@ -15,7 +15,7 @@
 #include "catalyst_adaptor/Parameters.h"
 #include "catalyst_adaptor/json/RunEngine.h"
 #include "vdi/comm/Communicator.h"
-#include "vdi/config/Json.h"
+#include "vdi/io/Json.h"
 
 struct vdi_catalyst : vdi::catalyst::FieldCalls {
   std::unique_ptr<vdi::catalyst::RunEngine> engine;
@@ -51,7 +51,7 @@ class Reading {
     if (code != VDI_CATALYST_OK) return code;
     code = guarded(self_, VDI_CATALYST_SCRIPT, [&] {
       if (comm_.rank() != 0) return;
-      const vdi::config::JsonLimits limits;
+      const vdi::io::JsonLimits limits;
       source_ = vdi::config::readRun({json, ::strnlen(json, limits.bytes + 1)});
     });
     if (code != VDI_CATALYST_OK) return code;

@@ -4,8 +4,8 @@
 
 #include "tests/Catch.h"
 #include "vdi/config/ColorMap.h"
-#include "vdi/config/Json.h"
 #include "vdi/core/Error.h"
+#include "vdi/io/Json.h"
 
 using namespace vdi;
 

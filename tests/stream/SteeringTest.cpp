@@ -195,7 +195,7 @@ TEST_CASE("what wasn't taken is merged, and the later wish wins") {
   CHECK_FALSE(wishes.take(std::chrono::milliseconds(0)));
   CHECK(
       logEntryOf(*request, 12, 0.5) ==
-      R"({"step":12,"time":0.5,"viewer":2,"steer":{"parameters":{"feed":0.02,"kill":0.5},"paused":false,"period":5}})");
+      R"({"step":12,"time":0.5,"viewer":2,"steer":{"period":5,"paused":false,"parameters":{"feed":0.02,"kill":0.5}}})");
   CHECK(summaryOf(request->wish) == "feed = 0.02, kill = 0.5, a VDI every 5 steps, go on");
   Wish sampled;
   sampled.samplingRate = 0.5;

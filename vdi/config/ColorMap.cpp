@@ -11,6 +11,9 @@
 
 namespace vdi::config {
 
+using io::JsonValue;
+using io::parseJson;
+
 namespace {
 
 constexpr double pi = std::numbers::pi;

@@ -5,9 +5,9 @@
 #include <string_view>
 #include <vector>
 
-#include "vdi/config/Json.h"
 #include "vdi/core/ScalarRange.h"
 #include "vdi/core/TransferFunction.h"
+#include "vdi/io/Json.h"
 
 namespace vdi::config {
 
@@ -18,7 +18,7 @@ struct ColorMap {
 };
 
 /// The limits of a preset file, which may have many presets with a node for each of 256 colours.
-inline constexpr JsonLimits presetLimits{
+inline constexpr io::JsonLimits presetLimits{
     .bytes = std::size_t{16} << 20, .depth = 16, .values = std::size_t{1} << 20};
 
 /// The preset with this name, or the file's only one if `name` is empty. Throws Error{Format} with the place

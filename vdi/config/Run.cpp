@@ -5,11 +5,13 @@
 #include <cmath>
 #include <system_error>
 
-#include "vdi/config/Json.h"
 #include "vdi/config/Presets.h"
 #include "vdi/core/Error.h"
+#include "vdi/io/Json.h"
 
 namespace vdi::config {
+
+using io::readJsonText;
 
 namespace {
 

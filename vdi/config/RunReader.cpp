@@ -11,13 +11,16 @@
 #include <string_view>
 #include <utility>
 
-#include "vdi/config/Json.h"
 #include "vdi/config/Run.h"
 #include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/SettingsTable.h"
+#include "vdi/io/Json.h"
 
 namespace vdi::config {
+
+using io::JsonValue;
+using io::parseJson;
 
 namespace {
 

@@ -17,6 +17,12 @@ template <std::integral Number>
 std::string jsonOf(Number number) {
   return std::to_string(number);
 }
+/// A flag's function has a name of its own, because pointers to characters would convert to bool.
+template <std::same_as<bool> Flag>
+std::string jsonOf(Flag flag) = delete;
+inline std::string jsonFlag(bool flag) {
+  return flag ? "true" : "false";
+}
 /// The list of values that are JSON already.
 std::string jsonListOf(const std::vector<std::string>& values);
 

@@ -1,13 +1,14 @@
 #include "vdi/stream/Protocol.h"
 
-#include <fmt/format.h>
-
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <nlohmann/json.hpp>
+#include <optional>
 
+#include "vdi/io/Json.h"
+#include "vdi/io/JsonText.h"
 #include "vdi/stream/SteeringJson.h"
 
 namespace vdi::stream {
@@ -16,95 +17,77 @@ static_assert(std::endian::native == std::endian::little, "chunk heads are copie
 
 namespace {
 
-using Json = nlohmann::json;
+using io::jsonFlag;
+using io::jsonListOf;
+using io::JsonObject;
+using io::jsonOf;
+using io::JsonValue;
 
-constexpr int maxDepth = 3;  // object, series, times
+JsonValue parsed(std::string_view text, std::size_t mostBytes) {
+  constexpr std::size_t depth = 3;  // object, series, times
+  return io::parseJson(text, "a message", {.bytes = mostBytes, .depth = depth});
+}
 
-Json parsed(std::string_view text) {
-  const auto shallow = [](int depth, Json::parse_event_t, Json&) {
-    if (depth > maxDepth) refuse("a message is nested too deeply");
-    return true;
-  };
-  Json message;
-  try {
-    message = Json::parse(text.begin(), text.end(), shallow);
-  } catch (const Json::exception&) {
-    refuse("a message isn't JSON");
-  }
-  if (!message.is_object()) refuse("a message isn't a JSON object");
-  return message;
+template <typename Integer>
+Integer countIn(const JsonValue& value) {
+  // JavaScript writes whole numbers up to 2^53 without a point.
+  constexpr std::uint64_t most = std::numeric_limits<std::int64_t>::max();
+  constexpr std::uint64_t bound = std::min<std::uint64_t>(most, std::numeric_limits<Integer>::max());
+  return static_cast<Integer>(value.whole(0, static_cast<std::int64_t>(bound)));
 }
 
 /// Reads the fields of a message.
 class Fields {
  public:
-  explicit Fields(const Json& object) : object_(object) {}
+  explicit Fields(const JsonValue& object) : object_(object) {}
 
-  std::string text(const char* name) const {
-    const Json& value = at(name);
-    if (!value.is_string()) refuse(fmt::format("\"{}\" isn't a string", name));
-    return value.get<std::string>();
-  }
-  bool flag(const char* name) const {
-    const Json& value = at(name);
-    if (!value.is_boolean()) refuse(fmt::format("\"{}\" isn't true or false", name));
-    return value.get<bool>();
-  }
-  double number(const char* name) const {
-    const Json& value = at(name);
-    if (!value.is_number()) refuse(fmt::format("\"{}\" isn't a number", name));
-    return value.get<double>();
-  }
+  const std::string& text(const char* name) const { return object_.at(name).text(); }
   template <typename Integer = std::uint32_t>
   Integer count(const char* name) const {
-    return asCount<Integer>(at(name), name);
+    return countIn<Integer>(object_.at(name));
   }
-  bool has(const char* name) const {
-    const auto found = object_.find(name);
-    return found != object_.end() && !found->is_null();
-  }
-  std::optional<double> numberIfAny(const char* name) const {
-    return has(name) ? std::optional(number(name)) : std::nullopt;
+  template <typename Integer = std::uint32_t>
+  std::optional<Integer> countIfAny(const char* name) const {
+    const std::optional<JsonValue> value = object_.findUnlessNull(name);
+    return value ? std::optional(countIn<Integer>(*value)) : std::nullopt;
   }
   /// "times" and "steps" of the object.
   Series series() const {
-    const Json& times = at("times");
-    const Json& steps = at("steps");
-    if (!times.is_array() || !steps.is_array() || times.size() != steps.size())
-      refuse("\"times\" and \"steps\" aren't arrays of one length");
+    const std::vector<JsonValue> times = object_.at("times").items();
+    const std::vector<JsonValue> steps = object_.at("steps").items();
+    if (times.size() != steps.size()) refuse("\"times\" and \"steps\" aren't arrays of one length");
     Series series;
-    for (const Json& time : times) {
-      if (!time.is_null() && !time.is_number()) refuse("\"times\" has an entry that isn't a number");
-      series.times.push_back(time.is_null() ? std::nullopt : std::optional(time.get<double>()));
-    }
-    for (const Json& step : steps) series.steps.push_back(asCount<std::uint64_t>(step, "steps"));
+    for (const JsonValue& time : times)
+      series.times.push_back(time.isNull() ? std::nullopt : std::optional(time.number()));
+    for (const JsonValue& step : steps) series.steps.push_back(countIn<std::uint64_t>(step));
     return series;
-  }
-  const Json& at(const char* name) const {
-    const auto found = object_.find(name);
-    if (found == object_.end()) refuse(fmt::format("a message lacks \"{}\"", name));
-    return *found;
   }
 
  private:
-  template <typename Integer>
-  static Integer asCount(const Json& value, const char* name) {
-    // JavaScript writes whole numbers up to 2^53 without a point.
-    if (!value.is_number_unsigned() || value.get<std::uint64_t>() > std::numeric_limits<Integer>::max())
-      refuse(fmt::format("\"{}\" isn't a whole number within its bounds", name));
-    return static_cast<Integer>(value.get<std::uint64_t>());
-  }
-  const Json& object_;
+  const JsonValue& object_;
 };
 
-Json numberOrNull(const std::optional<double>& value) {
-  return value && std::isfinite(*value) ? Json(*value) : Json();
+std::string numberOrNull(const std::optional<double>& value) {
+  return value && std::isfinite(*value) ? jsonOf(*value) : "null";
 }
 
-Json jsonOf(const Series& series) {
-  Json times = Json::array();
+template <typename Number>
+std::string countOrNull(const std::optional<Number>& value) {
+  return value ? jsonOf(*value) : "null";
+}
+
+JsonObject messageOf(const char* type) {
+  JsonObject message;
+  message.add("type", jsonOf(type));
+  return message;
+}
+
+void addSeries(JsonObject& object, const Series& series) {
+  std::vector<std::string> times;
   for (const std::optional<double>& time : series.times) times.push_back(numberOrNull(time));
-  return {{"times", std::move(times)}, {"steps", series.steps}};
+  std::vector<std::string> steps;
+  for (const std::uint64_t step : series.steps) steps.push_back(jsonOf(step));
+  object.add("times", jsonListOf(times)).add("steps", jsonListOf(steps));
 }
 
 Phase phaseOf(const std::string& name) {
@@ -114,120 +97,140 @@ Phase phaseOf(const std::string& name) {
   refuse("\"state\" is none of waiting, live and ended");
 }
 
-Json jsonOf(const Hello& hello) {
-  Json message{{"type", "hello"}, {"version", hello.version}, {"token", hello.token}};
-  message["session"] = hello.session ? Json(*hello.session) : Json();
-  message["have"] = hello.have ? Json(*hello.have) : Json();
+JsonObject objectOf(const Hello& hello) {
+  JsonObject message = messageOf("hello");
+  message.add("version", jsonOf(hello.version)).add("token", jsonOf(hello.token));
+  message.add("session", hello.session ? jsonOf(*hello.session) : "null");
+  message.add("have", countOrNull(hello.have));
   return message;
 }
-Json jsonOf(const Ack& ack) {
-  return {{"type", "ack"}, {"frame", ack.frame}, {"level", ack.level}, {"bytes", ack.bytes}};
-}
-Json jsonOf(const Show& show) {
-  return {{"type", "show"}, {"index", show.index}};
-}
-Json jsonOf(const Pause&) {
-  return Json::object({{"type", "pause"}});
-}
-Json jsonOf(const Resume&) {
-  return Json::object({{"type", "resume"}});
-}
-Json jsonOf(const Drive&) {
-  return Json::object({{"type", "drive"}});
-}
-Json jsonOf(const Release&) {
-  return Json::object({{"type", "release"}});
-}
-Json jsonOf(const Steer& steer) {
-  Json message = jsonOf(steer.wish);
-  message["type"] = "steer";
+JsonObject objectOf(const Ack& ack) {
+  JsonObject message = messageOf("ack");
+  message.add("frame", jsonOf(ack.frame)).add("level", jsonOf(ack.level)).add("bytes", jsonOf(ack.bytes));
   return message;
 }
-Json jsonOf(const Welcome& welcome) {
-  Json message{{"type", "welcome"},      {"version", welcome.version}, {"session", welcome.session},
-               {"steer", welcome.steer}, {"viewers", welcome.viewers}, {"pulse", welcome.pulse}};
-  message["series"] = welcome.series ? jsonOf(*welcome.series) : Json();
+JsonObject objectOf(const Show& show) {
+  JsonObject message = messageOf("show");
+  message.add("index", jsonOf(show.index));
   return message;
 }
-Json jsonOf(const SeriesPart& part) {
-  Json message = jsonOf(part.entries);
-  message["type"] = "series";
-  message["from"] = part.from;
+JsonObject objectOf(const Pause&) {
+  return messageOf("pause");
+}
+JsonObject objectOf(const Resume&) {
+  return messageOf("resume");
+}
+JsonObject objectOf(const Drive&) {
+  return messageOf("drive");
+}
+JsonObject objectOf(const Release&) {
+  return messageOf("release");
+}
+JsonObject objectOf(const Steer& steer) {
+  JsonObject message = messageOf("steer");
+  addWish(message, steer.wish);
   return message;
 }
-Json jsonOf(const State& state) {
-  Json message{{"type", "state"}, {"state", toString(state.phase)}, {"viewers", state.viewers}};
-  if (!state.cause.empty()) message["cause"] = state.cause;
+JsonObject objectOf(const Welcome& welcome) {
+  JsonObject message = messageOf("welcome");
+  message.add("version", jsonOf(welcome.version)).add("session", jsonOf(welcome.session));
+  message.add("steer", jsonFlag(welcome.steer)).add("viewers", jsonOf(welcome.viewers));
+  message.add("pulse", jsonOf(welcome.pulse));
+  JsonObject series;
+  if (welcome.series) addSeries(series, *welcome.series);
+  message.add("series", welcome.series ? series.text() : "null");
   return message;
 }
-Json jsonOf(const Level& level) {
-  return {{"type", "level"},        {"frame", level.frame},    {"level", level.level},
-          {"levels", level.levels}, {"bytes", level.bytes},    {"width", level.width},
-          {"height", level.height}, {"step", level.step},      {"time", numberOrNull(level.time)},
-          {"age", level.age},       {"dropped", level.dropped}};
-}
-Json jsonOf(const Missing& missing) {
-  return {{"type", "missing"}, {"frame", missing.frame}, {"cause", missing.cause}};
-}
-Json jsonOf(const Steering& steering) {
-  Json message = jsonOf(steering.controls);
-  message["type"] = "steering";
-  message["you"] = steering.you;
-  message["driver"] = steering.driver ? Json(*steering.driver) : Json();
+JsonObject objectOf(const SeriesPart& part) {
+  JsonObject message = messageOf("series");
+  addSeries(message, part.entries);
+  message.add("from", jsonOf(part.from));
   return message;
 }
-Json jsonOf(const Denied& denied) {
-  return {{"type", "denied"}, {"cause", denied.cause}};
+JsonObject objectOf(const State& state) {
+  JsonObject message = messageOf("state");
+  message.add("state", jsonOf(toString(state.phase))).add("viewers", jsonOf(state.viewers));
+  if (!state.cause.empty()) message.add("cause", jsonOf(state.cause));
+  return message;
 }
-Json jsonOf(const Refusal& refusal) {
-  return {{"type", "error"}, {"cause", refusal.cause}};
+JsonObject objectOf(const Level& level) {
+  JsonObject message = messageOf("level");
+  message.add("frame", jsonOf(level.frame)).add("level", jsonOf(level.level));
+  message.add("levels", jsonOf(level.levels)).add("bytes", jsonOf(level.bytes));
+  message.add("width", jsonOf(level.width)).add("height", jsonOf(level.height));
+  message.add("step", jsonOf(level.step)).add("time", numberOrNull(level.time));
+  message.add("age", jsonOf(level.age)).add("dropped", jsonOf(level.dropped));
+  return message;
 }
-Json jsonOf(const Unknown&) {
-  return Json::object({{"type", "unknown"}});
+JsonObject objectOf(const Missing& missing) {
+  JsonObject message = messageOf("missing");
+  message.add("frame", jsonOf(missing.frame)).add("cause", jsonOf(missing.cause));
+  return message;
+}
+JsonObject objectOf(const Steering& steering) {
+  JsonObject message = messageOf("steering");
+  addControls(message, steering.controls);
+  message.add("you", jsonOf(steering.you)).add("driver", countOrNull(steering.driver));
+  return message;
+}
+JsonObject objectOf(const Denied& denied) {
+  JsonObject message = messageOf("denied");
+  message.add("cause", jsonOf(denied.cause));
+  return message;
+}
+JsonObject objectOf(const Refusal& refusal) {
+  JsonObject message = messageOf("error");
+  message.add("cause", jsonOf(refusal.cause));
+  return message;
+}
+JsonObject objectOf(const Unknown&) {
+  return messageOf("unknown");
 }
 
 template <typename Message>
 std::string dumped(const Message& message) {
-  return std::visit(
-      [](const auto& m) { return jsonOf(m).dump(-1, ' ', false, Json::error_handler_t::replace); }, message);
+  return std::visit([](const auto& m) { return objectOf(m).text(); }, message);
 }
 
-Hello helloIn(const Fields& fields) {
+Hello helloIn(const JsonValue& object) {
+  const Fields fields(object);
   Hello hello;
   hello.version = static_cast<int>(fields.count<std::uint16_t>("version"));
   // A message of another version may have other fields, so only the version is read.
   if (hello.version != protocolVersion) return hello;
   hello.token = fields.text("token");
-  if (fields.has("session")) hello.session = fields.text("session");
-  if (fields.has("have")) hello.have = fields.count("have");
+  if (const auto session = object.findUnlessNull("session")) hello.session = session->text();
+  hello.have = fields.countIfAny("have");
   return hello;
 }
 
-Welcome welcomeIn(const Fields& fields) {
+Welcome welcomeIn(const JsonValue& object) {
+  const Fields fields(object);
   Welcome welcome;
   welcome.version = static_cast<int>(fields.count<std::uint16_t>("version"));
   welcome.session = fields.text("session");
-  welcome.steer = fields.flag("steer");
+  welcome.steer = object.at("steer").flag();
   welcome.viewers = fields.count("viewers");
-  if (fields.has("pulse")) welcome.pulse = fields.count("pulse");
-  if (fields.has("series")) {
-    const Json& series = fields.at("series");
-    if (!series.is_object()) refuse("\"series\" isn't an object");
-    welcome.series = Fields(series).series();
-  }
+  welcome.pulse = fields.countIfAny("pulse").value_or(welcome.pulse);
+  if (const auto series = object.findUnlessNull("series")) welcome.series = Fields(*series).series();
   return welcome;
 }
 
-Steering steeringIn(const Fields& fields, const Json& object) {
-  Steering steering;
-  steering.you = fields.count("you");
-  if (fields.has("driver")) steering.driver = fields.count("driver");
-  steering.controls = controlsIn(object);
-  return steering;
+State stateIn(const JsonValue& object) {
+  const Fields fields(object);
+  State state{phaseOf(fields.text("state")), fields.count("viewers"), {}};
+  if (const auto cause = object.findUnlessNull("cause")) state.cause = cause->text();
+  return state;
 }
 
-Level levelIn(const Fields& fields) {
+Steering steeringIn(const JsonValue& object) {
+  const Fields fields(object);
+  return {fields.count("you"), fields.countIfAny("driver"), controlsIn(object)};
+}
+
+Level levelIn(const JsonValue& object) {
   constexpr std::uint32_t mostLists = 1U << 20U;  // along an axis
+  const Fields fields(object);
   Level level;
   level.frame = fields.count("frame");
   level.level = fields.count("level");
@@ -239,9 +242,9 @@ Level levelIn(const Fields& fields) {
     refuse("a level is out of its bounds");
   level.width = static_cast<int>(width);
   level.height = static_cast<int>(height);
-  if (fields.has("step")) level.step = fields.count<std::uint64_t>("step");
-  level.time = fields.numberIfAny("time");
-  level.age = fields.number("age");
+  level.step = fields.countIfAny<std::uint64_t>("step").value_or(0);
+  if (const auto time = object.findUnlessNull("time")) level.time = time->number();
+  level.age = object.at("age").number();
   level.dropped = fields.count<std::uint64_t>("dropped");
   return level;
 }
@@ -268,11 +271,10 @@ std::string textOf(const FromServer& message) {
 }
 
 FromViewer viewerMessage(std::string_view text) {
-  if (text.size() > maxViewerText) refuse("a message is too long");
-  const Json object = parsed(text);
+  const JsonValue object = parsed(text, maxViewerText);
   const Fields fields(object);
-  const std::string type = fields.text("type");
-  if (type == "hello") return helloIn(fields);
+  const std::string& type = fields.text("type");
+  if (type == "hello") return helloIn(object);
   if (type == "ack")
     return Ack{fields.count("frame"), fields.count("level"), fields.count<std::uint64_t>("bytes")};
   if (type == "show") return Show{fields.count("index")};
@@ -285,19 +287,15 @@ FromViewer viewerMessage(std::string_view text) {
 }
 
 FromServer serverMessage(std::string_view text) {
-  if (text.size() > maxServerText) refuse("a message is too long");
-  const Json object = parsed(text);
+  const JsonValue object = parsed(text, maxServerText);
   const Fields fields(object);
-  const std::string type = fields.text("type");
-  if (type == "welcome") return welcomeIn(fields);
+  const std::string& type = fields.text("type");
+  if (type == "welcome") return welcomeIn(object);
   if (type == "series") return SeriesPart{fields.count("from"), fields.series()};
-  if (type == "state") {
-    return State{phaseOf(fields.text("state")), fields.count("viewers"),
-                 fields.has("cause") ? fields.text("cause") : std::string()};
-  }
-  if (type == "level") return levelIn(fields);
+  if (type == "state") return stateIn(object);
+  if (type == "level") return levelIn(object);
   if (type == "missing") return Missing{fields.count("frame"), fields.text("cause")};
-  if (type == "steering") return steeringIn(fields, object);
+  if (type == "steering") return steeringIn(object);
   if (type == "denied") return Denied{fields.text("cause")};
   if (type == "error") return Refusal{fields.text("cause")};
   return Unknown{};

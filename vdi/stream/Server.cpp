@@ -16,12 +16,12 @@
 #include <future>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <thread>
 #include <utility>
 
 #include "vdi/core/Error.h"
+#include "vdi/io/JsonText.h"
 #include "vdi/stream/Connection.h"
 #include "vdi/stream/Http.h"
 #include "vdi/stream/Token.h"
@@ -142,11 +142,12 @@ class Server::Impl {
  private:
   std::string statusText() const {
     const ServerStatus now = statusNow();
-    return nlohmann::json{{"session", now.session},
-                          {"state", toString(now.phase)},
-                          {"viewers", now.viewers},
-                          {"frames", now.frames}}
-        .dump();
+    return io::JsonObject()
+        .add("session", io::jsonOf(now.session))
+        .add("state", io::jsonOf(toString(now.phase)))
+        .add("viewers", io::jsonOf(now.viewers))
+        .add("frames", io::jsonOf(now.frames))
+        .text();
   }
   void say(const std::string& line) const {
     if (options_.log) options_.log(line);

@@ -13,98 +13,87 @@ namespace vdi::stream {
 
 namespace {
 
-using Json = nlohmann::json;
+using io::jsonFlag;
+using io::jsonListOf;
+using io::JsonObject;
+using io::jsonOf;
+using io::JsonValue;
 
 constexpr std::size_t maxPresets = 64;
 
-/// The field of an object; null if it is missing.
-const Json& at(const Json& object, const char* name) {
-  static const Json none;
-  const auto found = object.find(name);
-  return found == object.end() ? none : *found;
+int wholeIn(const JsonValue& value, int low, int high) {
+  return static_cast<int>(value.whole(low, high));
 }
 
-double numberIn(const Json& value, const char* name) {
-  if (!value.is_number() || !std::isfinite(value.get<double>()))
-    refuse(fmt::format("\"{}\" isn't a finite number", name));
-  return value.get<double>();
+std::string textIn(const JsonValue& value) {
+  if (value.text().size() > maxNameBytes)
+    value.fail(fmt::format("must be a string of at most {} bytes", maxNameBytes));
+  return value.text();
 }
 
-int wholeIn(const Json& value, const char* name, int low, int high) {
-  if (!value.is_number_integer() || value < low || value > high)
-    refuse(fmt::format("\"{}\" isn't a whole number from {} to {}", name, low, high));
-  return value.get<int>();
+std::vector<JsonValue> itemsIn(const JsonValue& value, std::size_t most) {
+  std::vector<JsonValue> items = value.items();
+  if (items.size() > most) value.fail(fmt::format("must be an array of at most {} entries", most));
+  return items;
 }
 
-bool flagIn(const Json& value, const char* name) {
-  if (!value.is_boolean()) refuse(fmt::format("\"{}\" isn't true or false", name));
-  return value.get<bool>();
+std::array<double, 2> rangeIn(const JsonValue& value) {
+  const std::vector<double> ends = value.numbers(2);
+  if (!(ends[0] < ends[1]) || !std::isfinite(ends[1] - ends[0])) value.fail("doesn't rise");
+  return {ends[0], ends[1]};
 }
 
-std::string textIn(const Json& value, const char* name) {
-  if (!value.is_string() || value.get_ref<const std::string&>().size() > maxNameBytes)
-    refuse(fmt::format("\"{}\" isn't a string of at most {} bytes", name, maxNameBytes));
-  return value.get<std::string>();
+std::array<int, 2> resolutionIn(const JsonValue& value, int least) {
+  const std::vector<JsonValue> sides = value.items();
+  if (sides.size() != 2) value.fail("must be an array of 2 whole numbers");
+  return {wholeIn(sides[0], least, View::maxSide), wholeIn(sides[1], least, View::maxSide)};
 }
 
-const Json& arrayIn(const Json& value, const char* name, std::size_t least, std::size_t most) {
-  if (!value.is_array() || value.size() < least || value.size() > most)
-    refuse(fmt::format("\"{}\" isn't an array of {} to {} entries", name, least, most));
-  return value;
+glm::dvec3 vectorIn(const JsonValue& value) {
+  const std::vector<double> numbers = value.numbers(3);
+  return {numbers[0], numbers[1], numbers[2]};
 }
 
-std::array<double, 2> rangeIn(const Json& value) {
-  arrayIn(value, "range", 2, 2);
-  const std::array range{numberIn(value[0], "range"), numberIn(value[1], "range")};
-  if (!(range[0] < range[1]) || !std::isfinite(range[1] - range[0])) refuse("\"range\" doesn't rise");
-  return range;
-}
-
-std::array<int, 2> resolutionIn(const Json& value, int least) {
-  arrayIn(value, "resolution", 2, 2);
-  return {wholeIn(value[0], "resolution", least, View::maxSide),
-          wholeIn(value[1], "resolution", least, View::maxSide)};
-}
-
-glm::dvec3 vectorIn(const Json& value, const char* name) {
-  arrayIn(value, name, 3, 3);
-  return {numberIn(value[0], name), numberIn(value[1], name), numberIn(value[2], name)};
-}
-
-Camera cameraIn(const Json& value) {
-  if (!value.is_object()) refuse("\"camera\" isn't an object");
+Camera cameraIn(const JsonValue& value) {
   Camera camera;
-  camera.position = vectorIn(at(value, "position"), "position");
-  camera.focalPoint = vectorIn(at(value, "focalPoint"), "focalPoint");
-  camera.viewUp = vectorIn(at(value, "viewUp"), "viewUp");
-  camera.parallelProjection = !at(value, "parallelScale").is_null();
-  if (camera.parallelProjection) {
-    camera.parallelScale = numberIn(value["parallelScale"], "parallelScale");
+  camera.position = vectorIn(value.at("position"));
+  camera.focalPoint = vectorIn(value.at("focalPoint"));
+  camera.viewUp = vectorIn(value.at("viewUp"));
+  const std::optional<JsonValue> parallelScale = value.findUnlessNull("parallelScale");
+  camera.parallelProjection = parallelScale.has_value();
+  if (parallelScale) {
+    camera.parallelScale = parallelScale->number();
   } else {
-    camera.viewAngle = numberIn(at(value, "viewAngle"), "viewAngle");
+    camera.viewAngle = value.at("viewAngle").number();
   }
   try {
     (void)View(camera, 1, 1);
   } catch (const Error& error) {
-    refuse(fmt::format("\"camera\": {}", error.what()));
+    value.fail(error.what());
   }
   return camera;
 }
 
-Json jsonOf(const glm::dvec3& vector) {
-  return Json::array({vector.x, vector.y, vector.z});
+std::string jsonOf(const glm::dvec3& vector) {
+  return jsonListOf({jsonOf(vector.x), jsonOf(vector.y), jsonOf(vector.z)});
 }
 
-Json jsonOf(const Camera& camera) {
-  Json object{{"position", jsonOf(camera.position)},
-              {"focalPoint", jsonOf(camera.focalPoint)},
-              {"viewUp", jsonOf(camera.viewUp)}};
+template <typename Number>
+std::string pairOf(const std::array<Number, 2>& pair) {
+  return jsonListOf({jsonOf(pair[0]), jsonOf(pair[1])});
+}
+
+std::string jsonOf(const Camera& camera) {
+  JsonObject object;
+  object.add("position", jsonOf(camera.position));
+  object.add("focalPoint", jsonOf(camera.focalPoint));
+  object.add("viewUp", jsonOf(camera.viewUp));
   if (camera.parallelProjection) {
-    object["parallelScale"] = camera.parallelScale;
+    object.add("parallelScale", jsonOf(camera.parallelScale));
   } else {
-    object["viewAngle"] = camera.viewAngle;
+    object.add("viewAngle", jsonOf(camera.viewAngle));
   }
-  return object;
+  return object.text();
 }
 
 std::string nameIn(const std::string& name) {
@@ -112,39 +101,57 @@ std::string nameIn(const std::string& name) {
   return name;
 }
 
-Parameter parameterIn(const Json& value) {
-  if (!value.is_object()) refuse("\"parameters\" has an entry that isn't an object");
+Parameter parameterIn(const JsonValue& value) {
   Parameter parameter;
-  parameter.name = nameIn(textIn(at(value, "name"), "name"));
-  parameter.isWhole = flagIn(at(value, "whole"), "whole");
-  parameter.value = numberIn(at(value, "value"), "value");
-  parameter.low = numberIn(at(value, "low"), "low");
-  parameter.high = numberIn(at(value, "high"), "high");
+  parameter.name = nameIn(textIn(value.at("name")));
+  parameter.isWhole = value.at("whole").flag();
+  parameter.value = value.at("value").number();
+  parameter.low = value.at("low").number();
+  parameter.high = value.at("high").number();
   if (!(parameter.low <= parameter.value && parameter.value <= parameter.high))
-    refuse("a parameter is out of its bounds");
+    value.fail("is out of its bounds");
   return parameter;
 }
 
-double samplingRateIn(const Json& value) {
-  const double rate = numberIn(value, "sampling_rate");
+double samplingRateIn(const JsonValue& value) {
+  const double rate = value.number();
   try {
     settingsTable()[indexOfSetting("SamplingRate")].check(rate);
   } catch (const Error& error) {
-    refuse(fmt::format("\"sampling_rate\": {}", error.what()));
+    value.fail(error.what());
   }
   return rate;
 }
 
-GeneratorControls generatorIn(const Json& value) {
-  if (!value.is_object()) refuse("\"generator\" isn't an object");
+GeneratorControls generatorIn(const JsonValue& value) {
   GeneratorControls controls;
-  controls.resolution = resolutionIn(at(value, "resolution"), 0);
-  controls.supersegments = wholeIn(at(value, "supersegments"), "supersegments", 0, maxSupersegments);
-  if (!at(value, "range").is_null()) controls.range = rangeIn(value["range"]);
-  for (const Json& preset : arrayIn(at(value, "presets"), "presets", 0, maxPresets))
-    controls.presets.push_back(textIn(preset, "presets"));
-  if (!at(value, "sampling_rate").is_null()) controls.samplingRate = samplingRateIn(value["sampling_rate"]);
+  controls.resolution = resolutionIn(value.at("resolution"), 0);
+  controls.supersegments = wholeIn(value.at("supersegments"), 0, maxSupersegments);
+  if (const auto range = value.findUnlessNull("range")) controls.range = rangeIn(*range);
+  for (const JsonValue& preset : itemsIn(value.at("presets"), maxPresets))
+    controls.presets.push_back(textIn(preset));
+  if (const auto rate = value.findUnlessNull("sampling_rate")) controls.samplingRate = samplingRateIn(*rate);
   return controls;
+}
+
+std::string jsonOf(const Parameter& parameter) {
+  JsonObject object;
+  object.add("name", jsonOf(parameter.name)).add("whole", jsonFlag(parameter.isWhole));
+  object.add("value", jsonOf(parameter.value));
+  object.add("low", jsonOf(parameter.low)).add("high", jsonOf(parameter.high));
+  return object.text();
+}
+
+std::string jsonOf(const GeneratorControls& controls) {
+  std::vector<std::string> presets;
+  for (const std::string& preset : controls.presets) presets.push_back(jsonOf(preset));
+  JsonObject object;
+  object.add("resolution", pairOf(controls.resolution));
+  object.add("supersegments", jsonOf(controls.supersegments));
+  object.add("range", controls.range ? pairOf(*controls.range) : "null");
+  object.add("presets", jsonListOf(presets));
+  if (controls.samplingRate) object.add("sampling_rate", jsonOf(*controls.samplingRate));
+  return object.text();
 }
 
 }  // namespace
@@ -153,87 +160,77 @@ void refuse(const std::string& what) {
   throw Error(ErrorCode::Format, what);
 }
 
-Json jsonOf(const Wish& wish) {
-  Json object = Json::object();
-  if (wish.camera) object["camera"] = jsonOf(*wish.camera);
-  if (wish.resolution) object["resolution"] = *wish.resolution;
-  if (wish.supersegments) object["supersegments"] = *wish.supersegments;
-  if (wish.samplingRate) object["sampling_rate"] = *wish.samplingRate;
-  if (wish.range) object["range"] = *wish.range;
-  if (wish.preset) object["preset"] = *wish.preset;
-  if (wish.period) object["period"] = *wish.period;
-  if (wish.paused) object["paused"] = *wish.paused;
-  if (!wish.parameters.empty()) object["parameters"] = wish.parameters;
-  return object;
+void addWish(JsonObject& object, const Wish& wish) {
+  if (wish.camera) object.add("camera", jsonOf(*wish.camera));
+  if (wish.resolution) object.add("resolution", pairOf(*wish.resolution));
+  if (wish.supersegments) object.add("supersegments", jsonOf(*wish.supersegments));
+  if (wish.samplingRate) object.add("sampling_rate", jsonOf(*wish.samplingRate));
+  if (wish.range) object.add("range", pairOf(*wish.range));
+  if (wish.preset) object.add("preset", jsonOf(*wish.preset));
+  if (wish.period) object.add("period", jsonOf(*wish.period));
+  if (wish.paused) object.add("paused", jsonFlag(*wish.paused));
+  if (wish.parameters.empty()) return;
+  JsonObject parameters;
+  for (const auto& [name, value] : wish.parameters) parameters.add(name, jsonOf(value));
+  object.add("parameters", parameters.text());
 }
 
-Wish wishIn(const Json& object) {
+Wish wishIn(const JsonValue& object) {
   Wish wish;
-  if (!at(object, "camera").is_null()) wish.camera = cameraIn(object["camera"]);
-  if (!at(object, "resolution").is_null()) wish.resolution = resolutionIn(object["resolution"], 1);
-  if (!at(object, "supersegments").is_null())
-    wish.supersegments = wholeIn(object["supersegments"], "supersegments", 1, maxSupersegments);
-  if (!at(object, "sampling_rate").is_null()) wish.samplingRate = samplingRateIn(object["sampling_rate"]);
-  if (!at(object, "range").is_null()) wish.range = rangeIn(object["range"]);
-  if (!at(object, "preset").is_null()) wish.preset = textIn(object["preset"], "preset");
-  if (!at(object, "period").is_null()) wish.period = wholeIn(object["period"], "period", 1, maxPeriod);
-  if (!at(object, "paused").is_null()) wish.paused = flagIn(object["paused"], "paused");
-  const Json& parameters = at(object, "parameters");
-  if (parameters.is_null()) return wish;
-  if (!parameters.is_object() || parameters.size() > maxParameters)
-    refuse(fmt::format("\"parameters\" isn't an object of at most {} entries", maxParameters));
-  for (const auto& [name, value] : parameters.items())
-    wish.parameters[nameIn(name)] = numberIn(value, "parameters");
+  const auto ifSet = [&](const char* name, auto read) {
+    if (const std::optional<JsonValue> value = object.findUnlessNull(name)) read(*value);
+  };
+  ifSet("camera", [&](const JsonValue& value) { wish.camera = cameraIn(value); });
+  ifSet("resolution", [&](const JsonValue& value) { wish.resolution = resolutionIn(value, 1); });
+  ifSet("supersegments",
+        [&](const JsonValue& value) { wish.supersegments = wholeIn(value, 1, maxSupersegments); });
+  ifSet("sampling_rate", [&](const JsonValue& value) { wish.samplingRate = samplingRateIn(value); });
+  ifSet("range", [&](const JsonValue& value) { wish.range = rangeIn(value); });
+  ifSet("preset", [&](const JsonValue& value) { wish.preset = textIn(value); });
+  ifSet("period", [&](const JsonValue& value) { wish.period = wholeIn(value, 1, maxPeriod); });
+  ifSet("paused", [&](const JsonValue& value) { wish.paused = value.flag(); });
+  ifSet("parameters", [&](const JsonValue& value) {
+    const auto members = value.members();
+    if (members.size() > maxParameters)
+      value.fail(fmt::format("must be an object of at most {} fields", maxParameters));
+    for (const auto& [name, number] : members) wish.parameters[nameIn(name)] = number.number();
+  });
   return wish;
 }
 
-Json jsonOf(const Controls& controls) {
-  Json object{{"period", controls.period}, {"paused", controls.paused}, {"parameters", Json::array()}};
-  for (const Parameter& parameter : controls.parameters) {
-    object["parameters"].push_back({{"name", parameter.name},
-                                    {"whole", parameter.isWhole},
-                                    {"value", parameter.value},
-                                    {"low", parameter.low},
-                                    {"high", parameter.high}});
-  }
-  object["generator"] = nullptr;
-  if (controls.generator) {
-    const GeneratorControls& generator = *controls.generator;
-    object["generator"] = {{"resolution", generator.resolution},
-                           {"supersegments", generator.supersegments},
-                           {"range", generator.range ? Json(*generator.range) : Json()},
-                           {"presets", generator.presets}};
-    if (generator.samplingRate) object["generator"]["sampling_rate"] = *generator.samplingRate;
-  }
-  return object;
+void addControls(JsonObject& object, const Controls& controls) {
+  std::vector<std::string> parameters;
+  for (const Parameter& parameter : controls.parameters) parameters.push_back(jsonOf(parameter));
+  object.add("period", jsonOf(controls.period)).add("paused", jsonFlag(controls.paused));
+  object.add("parameters", jsonListOf(parameters));
+  object.add("generator", controls.generator ? jsonOf(*controls.generator) : "null");
 }
 
-Controls controlsIn(const Json& object) {
+Controls controlsIn(const JsonValue& object) {
   Controls controls;
-  controls.period = wholeIn(at(object, "period"), "period", 1, maxPeriod);
-  controls.paused = flagIn(at(object, "paused"), "paused");
-  for (const Json& parameter : arrayIn(at(object, "parameters"), "parameters", 0, maxParameters))
+  controls.period = wholeIn(object.at("period"), 1, maxPeriod);
+  controls.paused = object.at("paused").flag();
+  for (const JsonValue& parameter : itemsIn(object.at("parameters"), maxParameters))
     controls.parameters.push_back(parameterIn(parameter));
-  if (!at(object, "generator").is_null()) controls.generator = generatorIn(object["generator"]);
+  if (const auto generator = object.findUnlessNull("generator")) controls.generator = generatorIn(*generator);
   return controls;
 }
 
 std::string textOf(const Wish& wish) {
-  return jsonOf(wish).dump();
+  JsonObject object;
+  addWish(object, wish);
+  return object.text();
 }
 
 Wish wishOf(std::string_view text) {
-  const nlohmann::json object = nlohmann::json::parse(text, nullptr, false);
-  if (!object.is_object()) throw Error(ErrorCode::Format, "a wish isn't a JSON object");
-  return wishIn(object);
+  return wishIn(io::parseJson(text, "a wish"));
 }
 
 std::string logEntryOf(const SteeringRequest& request, std::int64_t step, double time) {
-  nlohmann::ordered_json entry{{"step", step}};
-  entry["time"] = std::isfinite(time) ? nlohmann::ordered_json(time) : nlohmann::ordered_json();
-  entry["viewer"] = request.viewer;
-  entry["steer"] = jsonOf(request.wish);
-  return entry.dump();
+  JsonObject entry;
+  entry.add("step", jsonOf(step)).add("time", jsonOf(time)).add("viewer", jsonOf(request.viewer));
+  entry.add("steer", textOf(request.wish));
+  return entry.text();
 }
 
 }  // namespace vdi::stream

@@ -1,21 +1,22 @@
-// Wishes and controls as JSON. Only sources include this header, because it includes the JSON library.
+// Wishes and controls as JSON. Only sources include this header.
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 
+#include "vdi/io/Json.h"
+#include "vdi/io/JsonText.h"
 #include "vdi/stream/Steering.h"
 
 namespace vdi::stream {
 
 /// Throws Error{Format}.
 [[noreturn]] void refuse(const std::string& what);
-/// The fields of "steer" that are set, without its type.
-nlohmann::json jsonOf(const Wish& wish);
-/// The fields of "steering" that hold controls.
-nlohmann::json jsonOf(const Controls& controls);
+/// Adds the fields of "steer" that are set, without its type.
+void addWish(io::JsonObject& object, const Wish& wish);
+/// Adds the fields of "steering" that hold controls.
+void addControls(io::JsonObject& object, const Controls& controls);
 /// Throw Error{Format} for fields of the wrong kind or out of the bounds that Steering.h gives.
-Wish wishIn(const nlohmann::json& object);
-Controls controlsIn(const nlohmann::json& object);
+Wish wishIn(const io::JsonValue& object);
+Controls controlsIn(const io::JsonValue& object);
 
 }  // namespace vdi::stream

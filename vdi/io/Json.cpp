@@ -1,4 +1,4 @@
-#include "vdi/config/Json.h"
+#include "vdi/io/Json.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>  // fmt::join
@@ -16,7 +16,7 @@
 #include "vdi/core/Error.h"
 #include "vdi/io/Files.h"
 
-namespace vdi::config {
+namespace vdi::io {
 
 struct JsonNode {
   using Members = std::vector<std::pair<std::string, JsonNode>>;
@@ -202,6 +202,9 @@ bool JsonValue::isText() const {
 bool JsonValue::isFlag() const {
   return std::holds_alternative<bool>(node_->value);
 }
+bool JsonValue::isNull() const {
+  return std::holds_alternative<std::monostate>(node_->value);
+}
 
 std::optional<JsonValue> JsonValue::find(std::string_view name) const {
   const auto* members = std::get_if<JsonNode::Members>(&node_->value);
@@ -210,6 +213,12 @@ std::optional<JsonValue> JsonValue::find(std::string_view name) const {
     if (key == name) return child(node, escaped(key));
   }
   return std::nullopt;
+}
+
+std::optional<JsonValue> JsonValue::findUnlessNull(std::string_view name) const {
+  std::optional<JsonValue> value = find(name);
+  if (value && value->isNull()) value.reset();
+  return value;
 }
 
 JsonValue JsonValue::at(std::string_view name) const {
@@ -268,6 +277,14 @@ std::vector<JsonValue> JsonValue::items() const {
   return values;
 }
 
+std::vector<std::pair<std::string, JsonValue>> JsonValue::members() const {
+  const auto* nodes = std::get_if<JsonNode::Members>(&node_->value);
+  if (nodes == nullptr) fail("must be an object");
+  std::vector<std::pair<std::string, JsonValue>> values;
+  for (const auto& [name, node] : *nodes) values.emplace_back(name, child(node, escaped(name)));
+  return values;
+}
+
 std::vector<double> JsonValue::numbers(std::size_t count) const {
   const auto* nodes = std::get_if<std::vector<JsonNode>>(&node_->value);
   if (nodes == nullptr || nodes->size() != count) fail(fmt::format("must be an array of {} numbers", count));
@@ -287,7 +304,7 @@ JsonValue parseJson(std::string_view text, const std::string& name, const JsonLi
 }
 
 std::string readJsonText(const std::string& path, const JsonLimits& limits) {
-  const io::InputFile file(path);
+  const InputFile file(path);
   if (file.size() > limits.bytes) {
     throw Error(ErrorCode::Format,
                 fmt::format("the file has {} bytes; at most {} are allowed", file.size(), limits.bytes),
@@ -298,4 +315,4 @@ std::string readJsonText(const std::string& path, const JsonLimits& limits) {
   return text;
 }
 
-}  // namespace vdi::config
+}  // namespace vdi::io

@@ -1,4 +1,6 @@
-// A strict reader for JSON that people write. It reports each mistake with its place.
+// A strict reader for JSON, such as people write. It reports each mistake with its place. Its destructors
+// allocate nothing, in contrast to those of nlohmann's objects and lists: the process would end if that
+// failed.
 #pragma once
 
 #include <cstddef>
@@ -7,9 +9,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
-namespace vdi::config {
+namespace vdi::io {
 
 /// The limits of a document, so that a hostile one exhausts neither memory nor stack.
 struct JsonLimits {
@@ -28,9 +31,12 @@ class JsonValue {
   bool isArray() const;
   bool isText() const;
   bool isFlag() const;
+  bool isNull() const;
 
   /// The value of a field; nullopt if this object lacks it.
   std::optional<JsonValue> find(std::string_view name) const;
+  /// As find, and nullopt for null, too.
+  std::optional<JsonValue> findUnlessNull(std::string_view name) const;
   /// The value of a field; throws if this object lacks it.
   JsonValue at(std::string_view name) const;
   /// Throws unless this is an object whose fields are all among `known`.
@@ -42,6 +48,7 @@ class JsonValue {
   bool flag() const;
   const std::string& text() const;
   std::vector<JsonValue> items() const;
+  std::vector<std::pair<std::string, JsonValue>> members() const;  // names and values of an object's fields
   std::vector<double> numbers(std::size_t count) const;
 
   [[noreturn]] void fail(const std::string& what) const;
@@ -65,4 +72,4 @@ JsonValue parseJson(std::string_view text, const std::string& name, const JsonLi
 /// it is larger than the limit, and doesn't read it then.
 std::string readJsonText(const std::string& path, const JsonLimits& limits = {});
 
-}  // namespace vdi::config
+}  // namespace vdi::io

@@ -7,11 +7,11 @@
 
 #include "tests/Catch.h"
 #include "tests/TemporaryFolder.h"
-#include "vdi/config/Json.h"
 #include "vdi/core/Error.h"
+#include "vdi/io/Json.h"
 
 using namespace vdi;
-using config::parseJson;
+using io::parseJson;
 
 namespace {
 
@@ -80,11 +80,11 @@ TEST_CASE("files that aren't read") {
   const std::filesystem::path& folder = temporary.path();
   const std::string pipe = (folder / "pipe").string();
   REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
-  CHECK_THROWS_AS(config::readJsonText(pipe), Error);  // and doesn't wait for a writer
-  CHECK_THROWS_AS(config::readJsonText(folder.string()), Error);
-  CHECK_THROWS_AS(config::readJsonText((folder / "none").string()), Error);
+  CHECK_THROWS_AS(io::readJsonText(pipe), Error);  // and doesn't wait for a writer
+  CHECK_THROWS_AS(io::readJsonText(folder.string()), Error);
+  CHECK_THROWS_AS(io::readJsonText((folder / "none").string()), Error);
   const std::string large = (folder / "large").string();
   std::ofstream(large).close();
   std::filesystem::resize_file(large, std::uintmax_t{1} << 30);  // has no blocks
-  CHECK_THROWS_WITH(config::readJsonText(large), test::ContainsSubstring("the file has 1073741824 bytes"));
+  CHECK_THROWS_WITH(io::readJsonText(large), test::ContainsSubstring("the file has 1073741824 bytes"));
 }
