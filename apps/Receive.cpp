@@ -124,6 +124,24 @@ void requirePatience(const stream::Client::Standing& standing, double patience, 
                                          standing.trouble.empty() ? "no answer" : standing.trouble));
 }
 
+/// Ends a walk whose server is a relay that can't get at the series' own server.
+class SourcePatience {
+ public:
+  explicit SourcePatience(double seconds) : seconds_(seconds) {}
+  /// Throws Error{Io} if the server has said for so long why it has no frames.
+  void require(const stream::Client::Standing& standing, std::uint64_t count) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!standing.isConnected || standing.state.cause.empty()) since_ = now;
+    if (now - since_ < std::chrono::duration<double>(seconds_)) return;
+    throw Error(ErrorCode::Io, fmt::format("no frame for {:g} s after {} frames: {}", seconds_, count,
+                                           standing.state.cause));
+  }
+
+ private:
+  double seconds_;
+  std::chrono::steady_clock::time_point since_ = std::chrono::steady_clock::now();
+};
+
 void receive(const ReceiveOptions& options) {
   constexpr std::chrono::milliseconds pause{100};
   stream::ClientOptions connection;
@@ -138,6 +156,7 @@ void receive(const ReceiveOptions& options) {
   Recorder recorder(options);
   stream::Client client(std::move(connection));
   SeriesWalk walk;
+  SourcePatience sourcePatience(options.patience);
   while (options.frames == 0 || recorder.count() < options.frames) {
     std::optional<stream::Received> received = client.next(pause);
     const stream::Client::Standing standing = client.standing();
@@ -148,6 +167,7 @@ void receive(const ReceiveOptions& options) {
       const bool hasEnded = standing.state.phase == stream::Phase::Ended && !walk.hasBegun();
       if (hasEnded && !standing.isConnected && options.frames == 0 && recorder.count() > 0) return;
       requirePatience(standing, options.patience, recorder.count());
+      if (walk.hasBegun()) sourcePatience.require(standing, recorder.count());
       continue;
     }
     if (!walk.wants(*received)) continue;

@@ -9,6 +9,12 @@
 
 namespace vdi::apps {
 
+namespace {
+
+constexpr const char* gone = "the run has ended, and its server is gone";
+
+}  // namespace
+
 Relay::Relay(stream::ClientOptions from, stream::ServerOptions to)
     : options_(std::move(to)), client_(std::move(from)) {
   options_.show = [this](std::uint32_t index) {
@@ -23,6 +29,7 @@ void Relay::step(std::chrono::milliseconds time) {
   std::optional<stream::Received> received = client_.next(time);
   follow(client_.standing());
   if (received && received->session == session_) pass(*std::move(received));
+  if (!received && isOver_) giveUp();
   ask();
 }
 
@@ -46,10 +53,10 @@ void Relay::follow(const stream::Client::Standing& standing) {
 /// answer.
 void Relay::tell(const stream::Client::Standing& standing) {
   stream::State state{phase_.value_or(stream::Phase::Waiting), 0, {}};
-  const bool isOver = state.phase == stream::Phase::Ended && standing.hasBeenLive;
+  isOver_ = !standing.isConnected && state.phase == stream::Phase::Ended && standing.hasBeenLive;
   if (standing.isConnected) {
     if (standing.hasState) state.cause = standing.state.cause;
-  } else if (!standing.trouble.empty() && !isOver) {
+  } else if (!standing.trouble.empty() && !isOver_) {
     state.cause = "the source doesn't answer";
     if (state.phase == stream::Phase::Live) state.phase = stream::Phase::Waiting;
   }
@@ -67,6 +74,7 @@ void Relay::restart() {
   }
   seriesPassed_ = 0;
   phase_.reset();
+  isOver_ = false;
   told_ = {};
   current_.reset();
   whole_.clear();
@@ -93,9 +101,19 @@ void Relay::ask() {
       server_->provide(*known);
       continue;
     }
+    if (isOver_) {
+      server_->miss({*index, gone});
+      continue;
+    }
     asked_ = index;
     client_.show(*index);
   }
+}
+
+/// Answers for the frame that the other server was asked for. Viewers would wait for it for ever.
+void Relay::giveUp() {
+  if (asked_) server_->miss({*asked_, gone});
+  asked_.reset();
 }
 
 void Relay::finish(std::uint32_t index) {

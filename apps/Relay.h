@@ -18,7 +18,8 @@ namespace vdi::apps {
 
 /// A client of the other server and a server of its own. It passes on frames unchanged. If a viewer
 /// asks for a frame of the series, the relay fetches it, and newer frames wait meanwhile. If the
-/// other server restarts, viewers see a restart, too. While it doesn't answer, they are told so.
+/// other server restarts, viewers see a restart, too. While it doesn't answer, they are told so. Once
+/// it has ended a run, viewers get the frames that the relay still has, and hear that others are gone.
 class Relay {
  public:
   /// Throws Error as Client and Server do.
@@ -35,6 +36,7 @@ class Relay {
   void tell(const stream::Client::Standing& standing);
   void restart();
   void ask();
+  void giveUp();
   void pass(stream::Received received);
   void add(stream::Received received);
   void finish(std::uint32_t index);
@@ -43,6 +45,7 @@ class Relay {
   std::string session_;  // the other server's
   std::size_t seriesPassed_ = 0;
   std::optional<stream::Phase> phase_;            // the other server's
+  bool isOver_ = false;                           // the other server has ended its run, and is gone
   stream::State told_;                            // the state that viewers know, without their number
   std::shared_ptr<const stream::Frame> current_;  // the frame that is arriving
   std::uint32_t firstLevel_ = 0;                  // current_'s first level, as the other server counts

@@ -5,12 +5,13 @@ import pathlib
 import shlex
 import shutil
 import signal
+import socket
 import subprocess
 import time
 import unittest
 
 from tool import PATIENCE, VDI, ServedFolder, make, receive, until
-from viewer import Viewer
+from viewer import OneViewer, Viewer
 
 
 def vdi(*arguments):
@@ -185,6 +186,61 @@ class PipeTest(ServedFolder):
         while "cause" not in (state := viewer.text_message("state")):
             pass
         self.assertEqual((state["state"], state["cause"]), ("waiting", "the source doesn't answer"))
+        self.assertEqual(relay.end(), 0)
+
+    def test_a_relay_answers_for_a_run_that_has_ended(self):
+        self.appear("small0", "a.vdi")
+        first = self.serve("--token-file", self.token(), self.live)
+        relay = self.serve("--from", first.address, "--from-token-file", self.token())
+        viewer = self.view(relay)
+        levels = viewer.levels()
+        self.assertEqual(next(levels)[1], self.bytes_of("small0"))
+        for index in range(1, 6):
+            self.appear(f"small{index % 3}", f"{index}.vdi")
+            self.assertEqual(next(levels)[0]["frame"], index)
+        self.assertEqual(first.end(), 0)
+        while viewer.text_message("state")["state"] != "ended":
+            pass
+        # A viewer that comes now gets the frames that the relay has kept, and hears that others are gone.
+        done = receive(relay.link, "-o", self.folder / "got")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual([line for line in done.stderr.splitlines() if "is gone" in line],
+                         [f"vdi: frame {index}: the run has ended, and its server is gone" for index in (0, 1)])
+        for number in range(4):
+            self.assertEqual((self.folder / "got" / f"vdi_{number:06}.vdi").read_bytes(),
+                             self.bytes_of(f"small{(number + 2) % 3}"))
+        self.assertEqual(relay.end(), 0)
+
+    def test_a_relay_answers_for_frames_that_it_asked_for_before_the_run_ended(self):
+        with socket.create_server(("127.0.0.1", 0)) as listener:
+            relay = self.serve("--from", f"http://127.0.0.1:{listener.getsockname()[1]}/#token=" + "t" * 32)
+            source = OneViewer(listener, PATIENCE)
+            source.welcome("first", [0, 1])
+            source.send(type="state", state="live", viewers=1)
+            viewer = self.view(relay)
+            known = 0
+            while known < 2:
+                message = viewer.message()
+                known += len((message.get("series") or message).get("times", []))
+            viewer.send(type="show", index=1)
+            self.assertEqual(source.text_message("show")["index"], 1)
+            source.send(type="state", state="ended", viewers=1)
+            source.close()
+            missing = viewer.text_message("missing")
+            self.assertEqual((missing["frame"], missing["cause"]), (1, "the run has ended, and its server is gone"))
+            self.assertEqual(relay.end(), 0)
+
+    def test_receive_gives_up_a_series_whose_source_does_not_answer(self):
+        first = self.serve("--token-file", self.token(), *(self.made / f"small{index}.vdi" for index in range(3)))
+        relay = self.serve("--from", first.address, "--from-token-file", self.token())
+        viewer = self.view(relay)
+        next(viewer.levels())
+        first.kill()
+        while "cause" not in viewer.text_message("state"):
+            pass
+        done = receive(relay.link, "--patience", "1")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("no frame for 1 s after 0 frames: the source doesn't answer", done.stderr)
         self.assertEqual(relay.end(), 0)
 
     def token(self):
