@@ -112,6 +112,26 @@ TEST_CASE("neither file of a log loses its content if the other one can't be ope
   CHECK(contentOf(file) == "an earlier run\n");
 }
 
+TEST_CASE("a start that has no room leaves no file that it has made, and those that were there") {
+  const test::TemporaryFolder folder;
+  const fs::path fresh = folder.path() / "run.jsonl";
+  const fs::path old = folder.path() / "run.log";
+  const std::string line = "an earlier run\n";
+  std::ofstream(old) << line;
+  {
+    const test::FileSizeLimit full(line.size());
+    CHECK_THROWS_AS(RunLog({fresh, {}}, {"V", 1, 0}), Error);
+    CHECK_THROWS_AS(RunLog({{}, fresh}, {"V", 1, 0}), Error);
+    CHECK_THROWS_AS(RunLog({fresh, old}, {"V", 1, 0}), Error);
+    CHECK_THROWS_AS(RunLog({old, fresh}, {"V", 1, 0}), Error);
+  }
+  CHECK_THROWS_AS(RunLog({fresh, folder.path()}, {"V", 1, 0}), Error);
+  CHECK_FALSE(fs::exists(fresh));
+  CHECK(contentOf(old) == line);
+  RunLog({fresh, {}}, {"V", 1, 0});
+  CHECK(readRecords(fresh).starts.size() == 1);
+}
+
 TEST_CASE("a log begins anew where it is told to, and has what was left out") {
   const test::TemporaryFolder folder;
   const fs::path json = folder.path() / "run.jsonl";

@@ -25,7 +25,7 @@ namespace {
 
 }  // namespace
 
-/// A file to which lines are appended.
+/// A file to which lines are appended. Unless it is kept, a file that this object has made is removed again.
 class RunLog::Appended {
  public:
   explicit Appended(std::filesystem::path path) : path_(std::move(path)) {
@@ -34,13 +34,23 @@ class RunLog::Appended {
     if (error) throw Error(ErrorCode::Io, "can't make the log's folder: " + error.message(), path_.string());
     // Non-blocking, so that opening a file that isn't regular doesn't wait.
     constexpr mode_t readable = 0666;
-    descriptor_ = Descriptor(
-        ::open(path_.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK, readable));
+    constexpr int flags = O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NOCTTY | O_NONBLOCK;
+    descriptor_ = Descriptor(::open(path_.c_str(), flags | O_EXCL, readable));
+    isToRemove_ = descriptor_.isOpen();
+    if (!isToRemove_ && errno == EEXIST) descriptor_ = Descriptor(::open(path_.c_str(), flags, readable));
     if (!descriptor_.isOpen()) failWith("open the log", errno, path_);
     struct stat status {};
     if (::fstat(descriptor_.number(), &status) != 0 || !S_ISREG(status.st_mode))
       throw Error(ErrorCode::Io, "the log must be a regular file", path_.string());
   }
+
+  ~Appended() {
+    if (isToRemove_) ::unlink(path_.c_str());
+  }
+  Appended(const Appended&) = delete;
+  Appended& operator=(const Appended&) = delete;
+
+  void keep() { isToRemove_ = false; }
 
   void empty() {
     if (::ftruncate(descriptor_.number(), 0) != 0) failWith("empty the log", errno, path_);
@@ -64,6 +74,7 @@ class RunLog::Appended {
  private:
   std::filesystem::path path_;
   Descriptor descriptor_;
+  bool isToRemove_ = false;
 };
 
 RunLog::RunLog(const LogFiles& files, const RunStart& start, Before before) {
@@ -75,6 +86,10 @@ RunLog::RunLog(const LogFiles& files, const RunStart& start, Before before) {
   }
   summary_.isIsolated = start.isIsolated;
   append(jsonLine(start), textLine(start));
+  // An empty log, left by a start that failed, would be in the way of the next one.
+  for (Appended* file : {json_.get(), text_.get()}) {
+    if (file != nullptr) file->keep();
+  }
 }
 
 RunLog::~RunLog() = default;

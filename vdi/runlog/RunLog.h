@@ -21,7 +21,8 @@ struct LogFiles {
 class RunLog {
  public:
   enum class Before { Stays, Goes };  // whether the files keep their old content
-  /// Makes folders and files if need be. Throws Error{Io} with the path.
+  /// Makes folders and files if need be. Throws Error{Io} with the path, and then removes the files that it
+  /// has made.
   RunLog(const LogFiles& files, const RunStart& start, Before before = Before::Stays);
   /// Doesn't write the summary.
   ~RunLog();
