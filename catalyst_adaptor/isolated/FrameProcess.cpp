@@ -107,6 +107,8 @@ void FrameProcess::take(Socket::Received& received) {
       notice.text = message.takeText();
       for (auto count = message.take<std::uint64_t>(); count > 0; --count)
         notice.parameters.push_back(message.take<double>());
+      // The process may have been unable to map the pages, so it gets them again with their next step.
+      if (notice.code != 0) areKnown_[static_cast<std::size_t>(doneCount_ % 2)] = false;
       done_.push_back(std::move(notice));
       ++doneCount_;
       if (!underWay_.empty()) underWay_.pop_front();

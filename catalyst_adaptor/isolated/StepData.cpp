@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "catalyst_adaptor/Calls.h"
 #include "catalyst_adaptor/isolated/Packing.h"
 
 namespace vdi::catalyst {
@@ -31,6 +32,20 @@ int componentsOf(const Fields::NamedArray& array) {
 
 std::uint64_t bytesOf(const NumberColumn& column) {
   return column.isDouble ? sizeof(double) : sizeof(float);
+}
+
+/// Number of bytes of a block's values as StepWriter places them, exact if memory can hold so many. Throws
+/// std::runtime_error for what no StepWriter writes.
+double placedBytes(const vdi_catalyst_block& block, const StepData::Array& array) {
+  const bool isKnown = array.type >= VDI_CATALYST_U8 && array.type <= VDI_CATALYST_U64;
+  if (!isKnown || array.components < 1 || array.components > maxComponents)
+    throw std::runtime_error("a step's array '" + array.name + "' has an unknown type");
+  double bytes = static_cast<double>(catalyst::bytesOf(array.type)) * array.components;
+  for (const std::int32_t cells : block.cells) {
+    if (cells < 1) throw std::runtime_error("a step's block has no cells");
+    bytes *= static_cast<double>(cells) + (array.cells ? 0.0 : 1.0);
+  }
+  return bytes;
 }
 
 /// Number of values that the other process needs of a column.
@@ -133,12 +148,13 @@ void StepWriter::write(std::span<std::byte> to) const {
 StepData StepData::read(std::span<const std::byte> from) {
   Unpacker head(from);
   const auto begin = head.take<std::uint64_t>();
-  // The data at the next offset; null if there is no offset.
-  const auto placed = [&]() -> const std::byte* {
+  // That many bytes of data at the next offset; null if there is no offset.
+  const auto placed = [&](double bytes) -> const std::byte* {
     const auto offset = head.take<std::uint64_t>();
     if (offset == none) return nullptr;
     // An array without values may lie at the end of the memory.
-    if (begin > from.size() || offset > from.size() - begin)
+    if (begin > from.size() || offset > from.size() - begin ||
+        bytes > static_cast<double>(from.size() - begin - offset))
       throw std::runtime_error("a step's values lie outside the shared memory");
     return from.data() + begin + offset;
   };
@@ -153,7 +169,8 @@ StepData StepData::read(std::span<const std::byte> from) {
     array.type = head.take<std::int32_t>();
     array.components = head.take<std::int32_t>();
     for (double& offset : array.offset) offset = head.take<double>();
-    for (std::size_t i = 0; i < step.blocks.size(); ++i) array.blocks.push_back(placed());
+    for (const vdi_catalyst_block& block : step.blocks)
+      array.blocks.push_back(placed(placedBytes(block, array)));
   }
   for (auto particles = head.take<std::uint64_t>(); particles > 0; --particles) {
     StepData::Particles& one = step.particles.emplace_back();
@@ -162,12 +179,15 @@ StepData StepData::read(std::span<const std::byte> from) {
     for (double& offset : one.offset) offset = head.take<double>();
     given.kind = head.take<DepositKind>() == DepositKind::Density ? VDI_CATALYST_DENSITY : VDI_CATALYST_SUM;
     given.count = static_cast<std::int64_t>(head.take<std::uint64_t>());
+    if (given.count < 0) throw std::runtime_error("a step's particles are more than can be counted");
     const auto column = [&](const void*& first, std::int32_t& type, std::int64_t& stride) {
       const auto isDouble = head.take<bool>();
       const auto isOne = head.take<bool>();
       type = isDouble ? VDI_CATALYST_F64 : VDI_CATALYST_F32;
-      stride = isOne ? 0 : static_cast<std::int64_t>(isDouble ? sizeof(double) : sizeof(float));
-      first = placed();
+      const std::size_t bytes = isDouble ? sizeof(double) : sizeof(float);
+      stride = isOne ? 0 : static_cast<std::int64_t>(bytes);
+      const auto count = static_cast<double>(given.count);
+      first = placed(static_cast<double>(bytes) * (isOne ? std::min(count, 1.0) : count));
     };
     for (const void*& position : given.positions)
       column(position, given.position_type, given.position_stride);

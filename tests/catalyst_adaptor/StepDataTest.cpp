@@ -162,6 +162,49 @@ TEST_CASE("a step that is cut short is refused") {
   }
 }
 
+TEST_CASE("a step whose values would lie outside its memory is refused") {
+  Fields fields;
+  fields.setBlocks({blockAt(0.0, 2)});
+  const std::array<float, 8> numbers{};
+  fields.set(
+      Fields::arrayChange("E", true, VDI_CATALYST_F32,
+                          {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F32, true, 1, numbers.data())}));
+  vdi_catalyst_particles given{};
+  given.count = 7;
+  given.position_type = VDI_CATALYST_F32;
+  given.position_stride = sizeof(float);
+  for (const void*& position : given.positions) position = numbers.data();
+  fields.set(Fields::particlesChange("stars", particleArrayOf(&given)));
+  Bytes bytes(StepWriter(1, fields.blocks(), stepOf(fields), {}));
+  const std::span<std::byte> all = std::as_writable_bytes(std::span(bytes.words));
+  REQUIRE_NOTHROW(StepData::read(all));
+  // Puts a number where the head has another one, and takes it back when it has been read.
+  const auto refuses = [&](std::size_t place, const auto& number) {
+    std::array<std::byte, sizeof number> before{};
+    std::memcpy(before.data(), &all[place], sizeof number);
+    std::memcpy(&all[place], &number, sizeof number);
+    CHECK_THROWS_AS(StepData::read(all), std::runtime_error);
+    std::memcpy(&all[place], before.data(), sizeof number);
+  };
+  const auto places = [&](const auto& number) {
+    std::vector<std::size_t> found;
+    for (std::size_t i = 0; i + sizeof number <= 4096; ++i) {
+      if (std::memcmp(&all[i], &number, sizeof number) == 0) found.push_back(i);
+    }
+    return found;
+  };
+  const std::size_t block = 3 * sizeof(std::uint64_t);  // after the head's size, the version and the count
+  for (const std::int32_t cells : {0, -1, 100000, 2147483647}) refuses(block + 4, cells);
+  const std::array<char, 2> name{'E', 1};  // an array of cells
+  REQUIRE(places(name).size() == 1);
+  const std::size_t type = places(name)[0] + name.size();
+  for (const std::int32_t other : {-1, 10, 2147483647}) refuses(type, other);
+  for (const std::int32_t other : {-1, 0, 17}) refuses(type + 4, other);
+  REQUIRE(places(std::uint64_t{7}).size() == 1);  // the particles' number
+  for (const std::uint64_t other : {std::uint64_t{1} << 20, ~std::uint64_t{0}})
+    refuses(places(std::uint64_t{7})[0], other);
+}
+
 TEST_CASE("arrays keep the order in which they were first set") {
   Fields fields;
   fields.setBlocks({});

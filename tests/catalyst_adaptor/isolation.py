@@ -188,6 +188,27 @@ def no_room():
     assert "no room for 3 MiB of memory shared with the process" in run.lines[0] and "again" in run.lines[1], run.lines
 
 
+def unreadable():
+    """If a process can't map a step's pages, that step fails on all ranks, and the process makes the others' frames."""
+    for rank in {0, LAST}:
+        open("once", "w").close()
+        run = Run({"output": "r%d_{timestep}.vdi" % rank}, 6, VDI_TEST_SIZE="32", VDI_TEST_PAUSE="300",
+                  **dying("mapping", "fail", rank, VDI_TEST_DIE_ONCE=os.path.abspath("once")))
+        one_line(run, "step 0: rank %d: no room for 1 MiB of memory shared with the process.*annot allocate memory" % rank)
+        assert sorted([*run.codes, run.end]) == 6 * [0] + [SCRIPT], run.codes
+        assert made() == ["r%d_%d.vdi" % (rank, step) for step in range(1, 6)], made()
+        for name in made():
+            os.remove(name)
+
+
+def unnoted():
+    """If the first process can't map the pages with steps that were left out, the log lacks them, and frames go on."""
+    run = Run({"isolation": {"patience": 0}, "resolution": [400, 300], "log": "run.jsonl"}, 20, VDI_TEST_SIZE="32",
+              **dying("noting", "fail", 0))
+    assert set(run.codes) == {0} and run.end == 0 and made(), run.codes
+    assert any("the log lacks steps that were left out: no room" in line for line in run.lines), run.lines
+
+
 def launcher():
     """A launcher that is missing or fails is reported in one line, with its own output."""
     for wish in ("no-such-launcher -n {ranks}", "false {hosts}"):

@@ -4,11 +4,15 @@
 
 #include <array>
 #include <cstdint>
+#include <cstdio>
+#include <exception>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "catalyst_adaptor/Calls.h"
 #include "catalyst_adaptor/EngineFunctions.h"
 #include "catalyst_adaptor/isolated/Messages.h"
 #include "catalyst_adaptor/isolated/SharedPages.h"
@@ -28,6 +32,7 @@ class Worker {
   Worker(Socket socket, const Setup& setup) : socket_(std::move(socket)), setup_(setup) {
     // The launcher may number its processes in another order than the simulation's.
     MPI_Comm_split(MPI_COMM_WORLD, 0, setup.rank, &comm_);
+    reading_.comm = comm_;
   }
   ~Worker() { MPI_Comm_free(&comm_); }
   Worker(const Worker&) = delete;
@@ -81,11 +86,23 @@ class Worker {
                                                  pipelines.data(), &catalyst_);
   }
 
+  /// Notes the steps in the log, which lacks them if their pages can't be read: frames matter more.
   void logLeftOut(Socket::Received& received) {
-    const SharedPages pages(std::move(received.descriptors.at(0)));
-    Unpacker unpacker(pages.bytes());
-    for (const LeftOutSteps::Step& one : LeftOutSteps::unpack(unpacker).steps)
-      vdi_catalyst_log_left_out(catalyst_, one.step, one.time);
+    try {
+      const SharedPages pages(descriptorOf(received));
+      Unpacker unpacker(pages.bytes());
+      for (const LeftOutSteps::Step& one : LeftOutSteps::unpack(unpacker).steps)
+        vdi_catalyst_log_left_out(catalyst_, one.step, one.time);
+    } catch (const std::exception& error) {
+      std::fprintf(stderr, "vdi_catalyst: the log lacks steps that were left out: %s\n", error.what());
+    }
+  }
+
+  /// The descriptor that came with a message. Throws std::runtime_error if it got lost.
+  static Descriptor descriptorOf(Socket::Received& received) {
+    if (received.descriptors.empty())
+      throw std::runtime_error("no memory came from the simulation: too many files are open");
+    return std::move(received.descriptors.front());
   }
 
   void step(const StepNotice& notice, Socket::Received& received) {
@@ -93,24 +110,42 @@ class Worker {
     begun.put(Say::Begun);
     begun.put(notice.step);
     (void)socket_.send(begun.bytes());
-    SharedPages& buffer = buffers_.at(notice.buffer);
-    if (notice.isNewBuffer && !received.descriptors.empty())
-      buffer = SharedPages(std::move(received.descriptors.front()));
-    const StepData data = StepData::read(buffer.bytes());
-    int code = take(data);
-    if (code == VDI_CATALYST_OK) {
-      vdi_catalyst_set_clock(catalyst_, notice.clock);
-      code = vdi_catalyst_execute(catalyst_, notice.step, notice.time);
+    StepData data;
+    std::string error;
+    // A rank without the step's data must not leave the others waiting for it in the calls that follow.
+    int code = guarded(
+        reading_, VDI_CATALYST_SCRIPT, [&] { data = dataOf(notice, received); }, notice.step);
+    if (code != VDI_CATALYST_OK) {
+      data = {};  // parameters stay as they are on all ranks
+      error = reading_.error.substr(0, longestText);
+    } else {
+      reading_.printed.clear();
+      code = take(data);
+      if (code == VDI_CATALYST_OK) {
+        vdi_catalyst_set_clock(catalyst_, notice.clock);
+        code = vdi_catalyst_execute(catalyst_, notice.step, notice.time);
+      }
+      if (code != VDI_CATALYST_OK) error = errorText();
     }
     Packer done;
     done.put(Say::Done);
     done.put(notice.step);
     done.put(std::int32_t{code});
-    done.putText(code == VDI_CATALYST_OK ? "" : errorText());
+    done.putText(error);
     done.put(std::uint64_t{data.parameters.size()});
     for (const Parameter& parameter : data.parameters) done.put(inForceNow(parameter));
     (void)socket_.send(done.bytes());
     if (!setup_.isJson) tellWanted(notice.step + 1);
+  }
+
+  /// The step that lies in the notice's buffer. Throws if this process can't get at it, or if it is damaged.
+  StepData dataOf(const StepNotice& notice, Socket::Received& received) {
+    SharedPages& buffer = buffers_.at(notice.buffer);
+    if (notice.isNewBuffer) {
+      buffer = SharedPages();  // first, so that no later step is read from an earlier step's pages
+      buffer = SharedPages(descriptorOf(received));
+    }
+    return StepData::read(buffer.bytes());
   }
 
   /// Gives the engine the step's blocks, values and parameters.
@@ -204,6 +239,7 @@ class Worker {
   Socket socket_;
   const Setup& setup_;
   MPI_Comm comm_ = MPI_COMM_NULL;
+  Calls reading_;  // reports steps whose data can't be read
   vdi_catalyst* catalyst_ = nullptr;
   std::array<SharedPages, 2> buffers_;
   std::optional<std::uint64_t> version_;  // the version of the engine's blocks
