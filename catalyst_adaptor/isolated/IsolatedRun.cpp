@@ -343,8 +343,7 @@ int IsolatedRun::handOver(std::int64_t step, double time, double now) {
     }
   }
   // Scripts may use all fields, so they get all. If any rank lacks a field that a JSON run names, all ranks
-  // hand over all fields, too: their processes take the arrays collectively, and a message about a missing
-  // array lists the others.
+  // hand over all fields, too, so that a message about a missing array lists the others.
   bool namedAlone = false;
   int code = guarded(
       self_, VDI_CATALYST_SCRIPT, [&] { namedAlone = hasNamedFields(); }, step);

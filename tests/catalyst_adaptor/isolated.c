@@ -6,7 +6,8 @@
  * ranks have the same codes. VDI_TEST_SIZE: N, 16 unless given. VDI_TEST_PAUSE: milliseconds after each step.
  * VDI_TEST_REPEAT: how often the heat spreads in a step. VDI_TEST_KILL=STEP: kills the last rank's worker
  * while that step is handed over. VDI_TEST_FILE_LIMIT: the largest file, in bytes, that the last rank may
- * make during the first three steps. VDI_TEST_HURRY: how many times as fast the steady clock runs in this
+ * make during the first three steps. VDI_TEST_UNEQUAL: the first rank has a second array, "W", which the
+ * others lack. VDI_TEST_HURRY: how many times as fast the steady clock runs in this
  * process while it finalizes. */
 #define _GNU_SOURCE
 #include <dirent.h>
@@ -196,7 +197,12 @@ int main(int argc, char** argv) {
       const vdi_catalyst_strides strides = {
           {sizeof *now, (int64_t)(side * sizeof *now), (int64_t)(side * side * sizeof *now)}, 0};
       const void* data[] = {at(now, 1, 1, 1)};
-      vdi_catalyst_set_array_strided(catalyst, "T", VDI_CATALYST_F64, VDI_CATALYST_CELLS, 1, data, &strides);
+      const int is_unequal = getenv("VDI_TEST_UNEQUAL") != NULL;
+      for (int i = 0; i < 1 + is_unequal; ++i) {
+        const char* name = i == 0 || rank > 0 ? "T" : "W";
+        vdi_catalyst_set_array_strided(catalyst, name, VDI_CATALYST_F64, VDI_CATALYST_CELLS, 1, data,
+                                       &strides);
+      }
       if (step == kill_step && rank == ranks - 1) {
         worker = worker_of(rank);
         if (worker == 0) fprintf(stderr, "rank %d has no worker\n", rank);

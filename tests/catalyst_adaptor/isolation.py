@@ -209,6 +209,19 @@ def unnoted():
     assert any("the log lacks steps that were left out: no room" in line for line in run.lines), run.lines
 
 
+def unequal():
+    """Where ranks have different numbers of arrays, a rank without the array counts as one whose blocks lack it."""
+    for how in ("process", "none"):
+        run = Run({"field": "W", "output": how + "_{timestep}.vdi"}, 3, VDI_TEST_UNEQUAL="1", VDI_ISOLATION=how)
+        assert run.codes == [0, 0, 0] and run.end == 0 and not run.lines, run.lines
+    for step in range(3):
+        assert open("process_%d.vdi" % step, "rb").read() == open("none_%d.vdi" % step, "rb").read()
+    # A message about an array that all lack lists the others.
+    for how in ("process", "none"):
+        run = Run({"field": "X"}, 1, VDI_TEST_UNEQUAL="1", VDI_ISOLATION=how)
+        assert "no array 'X'; the arrays are: cells 'T', cells 'W'" in run.lines[0], run.lines
+
+
 def launcher():
     """A launcher that is missing or fails is reported in one line, with its own output."""
     for wish in ("no-such-launcher -n {ranks}", "false {hosts}"):

@@ -2,13 +2,17 @@
 
 #include <mpi.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstdio>
 #include <exception>
+#include <functional>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -18,6 +22,7 @@
 #include "catalyst_adaptor/isolated/SharedPages.h"
 #include "catalyst_adaptor/isolated/StepData.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
+#include "vdi/comm/Communicator.h"
 
 namespace vdi::catalyst {
 
@@ -27,11 +32,49 @@ namespace {
 constexpr std::int64_t stepsAhead = 1024;
 constexpr std::size_t longestText = 16384;
 
+/// The processes of all ranks, in the order of the simulation's ranks. The launcher may number them in
+/// another one.
+MPI_Comm inOrder(int rank) {
+  MPI_Comm comm = MPI_COMM_NULL;
+  MPI_Comm_split(MPI_COMM_WORLD, 0, rank, &comm);
+  return comm;
+}
+
+std::uint64_t hashOf(std::span<const std::byte> bytes) {
+  return std::hash<std::string_view>()({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+/// What the other ranks' processes have to know of a rank's arrays.
+void pack(const std::vector<StepData::Array>& arrays, Packer& packer) {
+  packer.put(std::uint64_t{arrays.size()});
+  for (const StepData::Array& array : arrays) {
+    packer.putText(array.name);
+    packer.put(array.cells);
+    packer.put(array.type);
+    packer.put(array.components);
+    packer.put(array.offset);
+  }
+}
+
+std::vector<StepData::Array> unpackArrays(Unpacker unpacker) {
+  std::vector<StepData::Array> arrays(unpacker.take<std::uint64_t>());
+  for (StepData::Array& array : arrays) {
+    array.name = unpacker.takeText();
+    array.cells = unpacker.take<bool>();
+    array.type = unpacker.take<std::int32_t>();
+    array.components = unpacker.take<std::int32_t>();
+    for (double& offset : array.offset) offset = unpacker.take<double>();
+  }
+  return arrays;
+}
+
 class Worker {
  public:
-  Worker(Socket socket, const Setup& setup) : socket_(std::move(socket)), setup_(setup) {
-    // The launcher may number its processes in another order than the simulation's.
-    MPI_Comm_split(MPI_COMM_WORLD, 0, setup.rank, &comm_);
+  Worker(Socket socket, const Setup& setup)
+      : socket_(std::move(socket)),
+        setup_(setup),
+        comm_(inOrder(setup.rank)),
+        ranks_(comm::Communicator::fromMpi(MPI_Comm_c2f(comm_))) {
     reading_.comm = comm_;
   }
   ~Worker() { MPI_Comm_free(&comm_); }
@@ -113,8 +156,14 @@ class Worker {
     StepData data;
     std::string error;
     // A rank without the step's data must not leave the others waiting for it in the calls that follow.
-    int code = guarded(
-        reading_, VDI_CATALYST_SCRIPT, [&] { data = dataOf(notice, received); }, notice.step);
+    int code = guardedTogether(
+        reading_, VDI_CATALYST_SCRIPT,
+        [&] {
+          ranks_.together([&] { data = dataOf(notice, received); });
+          addMissingArrays(data);
+          requireSameParticles(data);
+        },
+        notice.step);
     if (code != VDI_CATALYST_OK) {
       data = {};  // parameters stay as they are on all ranks
       error = reading_.error.substr(0, longestText);
@@ -146,6 +195,45 @@ class Worker {
       buffer = SharedPages(descriptorOf(received));
     }
     return StepData::read(buffer.bytes());
+  }
+
+  /// Collective: adds the arrays that only other ranks have, without values. Ranks of the simulation may have
+  /// different ones, but processes hand arrays over together. Throws on all ranks.
+  void addMissingArrays(StepData& data) const {
+    Packer own;
+    std::array<std::uint64_t, 2> extremes{};
+    ranks_.together([&] {
+      pack(data.arrays, own);
+      extremes = {hashOf(own.bytes()), ~hashOf(own.bytes())};
+    });
+    ranks_.allReduceMax(extremes);
+    if (extremes[0] == ~extremes[1]) return;
+    const comm::Gathered all = ranks_.allGather(own.bytes(), 1);
+    ranks_.together([&] {
+      for (int rank = 0; rank < ranks_.size(); ++rank) {
+        for (StepData::Array& array : unpackArrays(Unpacker(all.of(rank)))) {
+          const auto isSame = [&](const StepData::Array& other) {
+            return other.name == array.name && other.cells == array.cells;
+          };
+          if (std::ranges::any_of(data.arrays, isSame)) continue;
+          array.blocks.resize(data.blocks.size());
+          data.arrays.push_back(std::move(array));
+        }
+      }
+    });
+  }
+
+  /// Collective: throws on all ranks if they have particles of different names or kinds, which are deposited
+  /// together.
+  void requireSameParticles(const StepData& data) const {
+    ranks_.requireEqual([&] {
+      Packer names;
+      for (const StepData::Particles& particles : data.particles) {
+        names.putText(particles.name);
+        names.put(particles.given.kind);
+      }
+      return std::vector{comm::Communicator::Fingerprint{hashOf(names.bytes()), "the names of particles"}};
+    });
   }
 
   /// Gives the engine the step's blocks, values and parameters.
@@ -238,7 +326,8 @@ class Worker {
 
   Socket socket_;
   const Setup& setup_;
-  MPI_Comm comm_ = MPI_COMM_NULL;
+  MPI_Comm comm_;
+  const comm::Communicator ranks_;
   Calls reading_;  // reports steps whose data can't be read
   vdi_catalyst* catalyst_ = nullptr;
   std::array<SharedPages, 2> buffers_;
