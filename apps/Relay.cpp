@@ -28,8 +28,11 @@ Relay::Relay(stream::ClientOptions from, stream::ServerOptions to)
 void Relay::step(std::chrono::milliseconds time) {
   std::optional<stream::Received> received = client_.next(time);
   follow(client_.standing());
-  if (received && received->session == session_) pass(*std::move(received));
-  if (!received && isOver_) giveUp();
+  if (!received) {
+    if (isOver_) giveUp();
+  } else if (received->session == session_) {
+    pass(*std::move(received));
+  }
   ask();
 }
 
