@@ -67,11 +67,36 @@ for name, values in (("FillGhosts", (0, 1)), ("PictureOnly", (0, 1)), ("Componen
 vectors = filter_of(simple.ProgrammableSource(OutputDataSetType="vtkMultiblockDataSet", Script=VECTORS), "velocity")
 check(not errors_of(vectors), "rank %d: vectors of one rank are rendered" % rank)
 vectors.Component = 2
-check(range_of(vectors.LookupTable) == [0, 3], "rank %d: a component has its range %s" % (rank, range_of(vectors.LookupTable)))
+check(not errors_of(vectors) and range_of(vectors.LookupTable) == [0, 3],
+      "rank %d: a component has its range %s" % (rank, range_of(vectors.LookupTable)))
 vectors.SelectInputScalars = ["POINTS", "force"]
-check(range_of(vectors.LookupTable) == [0, 5] and vectors.Component == 2,
+check(not errors_of(vectors) and range_of(vectors.LookupTable) == [0, 5] and vectors.Component == 2,
       "rank %d: another array's component has its range %s" % (rank, range_of(vectors.LookupTable)))
-check(not errors_of(vectors), "rank %d: component and array are the same on all ranks" % rank)
+
+# A component that one rank's script sets alone is an error, and nobody waits for the rank that sets nothing.
+if rank == 0:
+    vectors.Component = 0
+with Messages("ErrorEvent") as texts:
+    vectors.UpdatePipeline()  # without a time, VTK updates only what has changed
+check("different values: Component" in "".join(texts), "rank %d: a vector's component that differs is an error" % rank)
+if rank > 0:
+    vectors.Component = 1
+check(not errors_of(vectors), "rank %d: if both have set another one, that isn't reported twice" % rank)
+vectors.Component = 0
+check(not errors_of(vectors) and range_of(vectors.LookupTable) == [0, 1],
+      "rank %d: once the component is equal again, it has its range %s" % (rank, range_of(vectors.LookupTable)))
+
+# The first update takes a cropped volume's box. A rank's client knows only the bounds of its own piece.
+view = simple.CreateRenderView(ViewSize=[64, 48])
+volume = simple.Show(wavelet, view, "UniformGridRepresentation", Representation="Volume")
+volume.ColorArrayName = ["POINTS", "RTData"]
+volume.UseCropping, volume.CroppingOrigin, volume.CroppingScale = 1, [1, 0, 0], [0.5, 0.5, 0.5]
+view.CameraPosition, view.CameraFocalPoint = [0, 0, 60], [0, 0, 0]
+simple.SetActiveView(view)
+cropped = simple.VolumetricDepthImage(Input=wavelet, SelectInputScalars=["POINTS", "RTData"])
+texts = errors_of(cropped)
+check(not texts and cropped.Cropping == 1, "rank %d: a cropped volume is rendered: %s" % (rank, texts))
+check(list(cropped.CroppingBox) == [-3, 5, -4, 4, -4, 4], "rank %d: its box is %s" % (rank, list(cropped.CroppingBox)))
 
 # Rank 0 alone makes the output. It refuses an array's name that is too long for a file.
 NAME = "x" * 2 ** 20

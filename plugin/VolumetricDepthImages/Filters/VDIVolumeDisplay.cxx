@@ -119,19 +119,6 @@ bool areUnset(vtkSMProxy* filter, std::initializer_list<const char*> properties)
   });
 }
 
-/// The box to which the scale and the origin of a cropped volume apply (pv::cropsByExtent). ParaView has no
-/// useful extent for several data sets, so their box comes from their bounds in each version.
-vdi::Box wholeToCrop(vtkPVDataInformation* data) {
-  std::array<double, 6> b{};
-  data->GetBounds(b.data());
-  if (cropsByExtent && (data->DataSetTypeIsA("vtkImageData") || data->DataSetTypeIsA("vtkRectilinearGrid"))) {
-    std::array<int, 6> extent{};
-    data->GetExtent(extent.data());
-    std::copy(extent.begin(), extent.end(), b.begin());
-  }
-  return {{b[0], b[2], b[4]}, {b[1], b[3], b[5]}};
-}
-
 /// Whether a property, whose name differs among versions of ParaView, exists and isn't the default.
 bool isChanged(vtkSMProxy* shown, const char* name) {
   vtkSMProperty* property = shown->GetProperty(name);
@@ -191,11 +178,23 @@ void takeShading(vtkSMProxy* filter, vtkSMProxy* shown, vtkSMRenderViewProxy* vi
     vtkSMPropertyHelper(filter, "Ambient").Set(vtkSMPropertyHelper(shown, "Ambient").GetAsDouble());
 }
 
-void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, vtkPVDataInformation* data) {
-  if (!isVolume(shown) || !isOn(shown, "UseCropping") || data == nullptr) return;
+// pv::cropsByExtent tells which box that is. ParaView has no useful extent for several data sets, so their
+// box comes from their bounds in each version.
+vdi::Box wholeToCrop(vtkPVDataInformation* data) {
+  if (data == nullptr) return {};
+  std::array<double, 6> b{};
+  data->GetBounds(b.data());
+  if (cropsByExtent && (data->DataSetTypeIsA("vtkImageData") || data->DataSetTypeIsA("vtkRectilinearGrid"))) {
+    std::array<int, 6> extent{};
+    data->GetExtent(extent.data());
+    std::copy(extent.begin(), extent.end(), b.begin());
+  }
+  return {{b[0], b[2], b[4]}, {b[1], b[3], b[5]}};
+}
+
+void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, const vdi::Box& whole) {
+  if (!isVolume(shown) || !isOn(shown, "UseCropping") || whole.empty()) return;
   if (!areUnset(filter, {"Cropping", "CroppingBox"})) return;
-  const vdi::Box whole = wholeToCrop(data);
-  if (whole.empty()) return;
   const vtkSMPropertyHelper origin(shown, "CroppingOrigin");
   const vtkSMPropertyHelper scale(shown, "CroppingScale");
   std::array<double, 6> box{};

@@ -5,6 +5,9 @@
 
 #include <string>
 
+namespace vdi {
+struct Box;
+}
 class vtkPVDataInformation;
 class vtkSMProxy;
 class vtkSMRenderViewProxy;
@@ -20,9 +23,13 @@ void takeShading(vtkSMProxy* filter, vtkSMProxy* shown, vtkSMRenderViewProxy* vi
 /// user has set others.
 void takeLights(vtkSMProxy* filter, vtkSMRenderViewProxy* view);
 
-/// Sets Cropping and CroppingBox if `shown` shows a cropped volume: to the box that ParaView draws. `data`
-/// describes the shown data; null means that there are none.
-void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, vtkPVDataInformation* data);
+/// The box to which the scale and the origin of a cropped volume of these data apply. Null means that there
+/// are no data, and gives an empty box.
+vdi::Box wholeToCrop(vtkPVDataInformation* data);
+
+/// Sets Cropping and CroppingBox if `shown` shows a cropped volume: to the box that ParaView draws. `whole`
+/// is that of wholeToCrop, over all ranks.
+void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, const vdi::Box& whole);
 
 /// Sets BlendMode and IsosurfaceValues of `filter` if `shown` shows a volume in a blend mode that the filter
 /// has.

@@ -32,7 +32,9 @@
 #include <cmath>
 #include <cstddef>
 #include <exception>
+#include <functional>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <string_view>
 #include <utility>
@@ -120,12 +122,10 @@ vtkMultiProcessController* ranksWithClients() {
   return vtkMultiProcessController::GetGlobalController();
 }
 
-/// Collective if each rank has a client: replaces the numbers by the largest over the ranks. Returns false if
-/// another rank doesn't take part; the next update reports that.
+/// Collective: replaces the numbers by the largest over the ranks. Returns false if another rank doesn't take
+/// part; the next update reports that.
 template <std::size_t N>
-bool takeLargest(std::array<double, N>& numbers, const char* what) {
-  vtkMultiProcessController* ranks = ranksWithClients();
-  if (ranks == nullptr) return true;
+bool takeLargest(vtkMultiProcessController* ranks, std::array<double, N>& numbers, const char* what) {
   try {
     pv::enterCollective(ranks, what);
   } catch (const vdi::Error&) {
@@ -136,13 +136,10 @@ bool takeLargest(std::array<double, N>& numbers, const char* what) {
   return true;
 }
 
-/// Widens the range over the ranks if each has a client. Collective then, and returns as takeLargest does.
-bool WidenOverRanks(double range[2]) {
-  std::array<double, 2> ends{-range[0], range[1]};
-  if (!takeLargest(ends, "range of VolumetricDepthImage's colour map")) return false;
-  range[0] = -ends[0];
-  range[1] = ends[1];
-  return true;
+/// A number that doubles hold exactly. Different texts have different ones, in all likelihood.
+double identityOf(const std::string& text) {
+  constexpr std::size_t most = (std::size_t{1} << 53) - 1;
+  return static_cast<double>(std::hash<std::string>()(text) & most);
 }
 
 vdi::Camera cameraOf(vtkCamera* camera) {
@@ -181,6 +178,16 @@ std::array<int, 2> resolutionOf(vtkSMViewProxy* view) {
 
 vtkStandardNewMacro(vtkSMVDIGeneratorProxy);
 
+/// What the clients of all ranks know of the input and its array, each of its own part.
+struct vtkSMVDIGeneratorProxy::InputOfRanks {
+  int Components = 0;
+  std::array<double, 2> Range{};  // the lower end is above the upper one if there are no values
+  vdi::Box Whole;                 // pv::wholeToCrop
+};
+
+vtkSMVDIGeneratorProxy::vtkSMVDIGeneratorProxy() = default;
+vtkSMVDIGeneratorProxy::~vtkSMVDIGeneratorProxy() = default;
+
 bool vtkSMVDIGeneratorProxy::EnterUpdate(vtkSMProxy* proxy) {
   if constexpr (pv::updatesAreCollective) {
     try {
@@ -215,7 +222,9 @@ void vtkSMVDIGeneratorProxy::UpdatePipeline(double time) {
 
 void vtkSMVDIGeneratorProxy::UpdateVTKObjects() {
   this->Superclass::UpdateVTKObjects();
-  if (this->Taken && !this->Choosing) this->FollowArray();
+  // Where each rank has a client, only some of their scripts may set this property. The ranks meet in the
+  // next update.
+  if (this->Taken && !this->Choosing && ranksWithClients() == nullptr) this->FollowArray();
 }
 
 int vtkSMVDIGeneratorProxy::LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) {
@@ -231,11 +240,67 @@ void vtkSMVDIGeneratorProxy::LoadState(const vtkSMMessage* state, vtkSMProxyLoca
 }
 
 void vtkSMVDIGeneratorProxy::TakeWhatIsNotSet(std::optional<double> time) {
+  if (vtkMultiProcessController* ranks = ranksWithClients()) {
+    if (!this->MeetRanks(ranks, time)) return;
+    if (this->Taken) this->FollowArray();
+  }
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "what the view shows");
   this->TakeFromView();
   const Set choosing(this->Choosing);
   this->ChooseLookupTable(time, nullptr);
   this->Shown = this->CurrentSubject();
+}
+
+bool vtkSMVDIGeneratorProxy::MeetRanks(vtkMultiProcessController* ranks, std::optional<double> time) {
+  this->OfRanks.reset();
+  const Subject now = this->CurrentSubject();
+  const double subject =
+      identityOf(now.Array + '\n' + std::to_string(now.Association) + '\n' + std::to_string(now.Component));
+  const bool isNew = !this->Taken || !this->Shown || now != *this->Shown || this->LacksLookupTable();
+  enum { Highest, Lowest, New, Changed, Unchanged };
+  std::array<double, 5> all{subject, -subject, isNew ? 1.0 : 0.0, this->NeedsUpdate ? 1.0 : 0.0,
+                            this->NeedsUpdate ? 0.0 : 1.0};
+  if (!takeLargest(ranks, all, "VolumetricDepthImage's properties")) return false;
+  const bool isSame = all[Highest] == -all[Lowest];
+  // A rank whose script has changed nothing would leave the others waiting in the filter.
+  if (!isSame || (all[Changed] != 0.0 && all[Unchanged] != 0.0)) {
+    this->InvokeCommand("Renew");
+    this->MarkDirty(this);
+  }
+  return isSame && (all[New] == 0.0 || this->GatherInput(ranks, now, time));
+}
+
+bool vtkSMVDIGeneratorProxy::GatherInput(vtkMultiProcessController* ranks, const Subject& subject,
+                                         std::optional<double> time) {
+  std::array<double, 2> range{};
+  const bool hasRange = this->RangeOfScalars(subject.Array.c_str(), subject.Association, time, range.data());
+  const vdi::Box whole = pv::wholeToCrop(this->InputInformation());
+  // Ranks without blocks take part: they must take the same next steps as the others.
+  constexpr double none = -std::numeric_limits<double>::infinity();
+  enum { Components, Low, High, Box };
+  std::array<double, 9> numbers{};
+  numbers.fill(none);
+  numbers[Components] = this->ComponentsOf(subject.Array, subject.Association);
+  if (hasRange) {
+    numbers[Low] = -range[0];
+    numbers[High] = range[1];
+  }
+  for (int axis = 0; axis < 3 && !whole.empty(); ++axis) {
+    const std::size_t place = Box + 2 * static_cast<std::size_t>(axis);
+    numbers[place] = -whole.lo[axis];
+    numbers[place + 1] = whole.hi[axis];
+  }
+  if (!takeLargest(ranks, numbers, "VolumetricDepthImage's input")) return false;
+  this->OfRanks = std::make_unique<InputOfRanks>();
+  InputOfRanks& input = *this->OfRanks;
+  input.Components = static_cast<int>(numbers[Components]);
+  input.Range = {-numbers[Low], numbers[High]};
+  for (int axis = 0; axis < 3 && numbers[Box] > none; ++axis) {
+    const std::size_t place = Box + 2 * static_cast<std::size_t>(axis);
+    input.Whole.lo[axis] = -numbers[place];
+    input.Whole.hi[axis] = numbers[place + 1];
+  }
+  return true;
 }
 
 vtkSMVDIGeneratorProxy::Subject vtkSMVDIGeneratorProxy::CurrentSubject() {
@@ -269,10 +334,7 @@ void vtkSMVDIGeneratorProxy::FollowArray() {
   }
   const Subject before = std::exchange(*this->Shown, now);
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "the array's map and settings");
-  if (now.Input != before.Input || now.Port != before.Port) {
-    this->Components.clear();
-    this->TakeUnitDistance();
-  }
+  if (now.Input != before.Input || now.Port != before.Port) this->TakeUnitDistance();
   // A component that the new array lacks belonged to the old one.
   if (now.Array != before.Array && now.Component == before.Component && now.Component > 0 &&
       now.Component >= this->ComponentsOf(now.Array, now.Association)) {
@@ -338,20 +400,11 @@ void vtkSMVDIGeneratorProxy::TakeArrayFromView() {
 }
 
 int vtkSMVDIGeneratorProxy::ComponentsOf(const std::string& name, int association) {
-  if (const auto known = this->Components.find(name); known != this->Components.end()) return known->second;
+  if (this->OfRanks) return this->OfRanks->Components;
   vtkPVDataInformation* data = this->InputInformation();
   vtkPVArrayInformation* array =
       data != nullptr ? data->GetArrayInformation(name.c_str(), association) : nullptr;
-  const int here = array != nullptr ? array->GetNumberOfComponents() : 0;
-  if (ranksWithClients() == nullptr) return here;
-  // A rank without blocks doesn't know the array, but must take the same next steps as the others. A known
-  // array isn't asked for again, so that ranks that disagree on the component alone don't wait here for ever.
-  // The next update reports the disagreement.
-  std::array<double, 1> most{static_cast<double>(here)};
-  if (!takeLargest(most, "components of VolumetricDepthImage's array")) return here;
-  const int components = static_cast<int>(most[0]);
-  if (components > 0) this->Components[name] = components;
-  return components;
+  return array != nullptr ? array->GetNumberOfComponents() : 0;
 }
 
 void vtkSMVDIGeneratorProxy::Forget() {
@@ -374,7 +427,8 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
   if (!hasCamera || !hasSize || this->HasViewpointOfView) {
     this->TakeUnitDistance();
     pv::takeShading(this, shown, view);
-    pv::takeCropping(this, shown, this->InputInformation());
+    pv::takeCropping(this, shown,
+                     this->OfRanks ? this->OfRanks->Whole : pv::wholeToCrop(this->InputInformation()));
     pv::takeBlending(this, shown);
     if (const std::string issues = pv::displayIssues(shown); !issues.empty()) vtkWarningMacro(<< issues);
   }
@@ -529,12 +583,17 @@ void vtkSMVDIGeneratorProxy::ReleaseNow() {
   this->MarkDirty(this);
 }
 
+bool vtkSMVDIGeneratorProxy::LacksLookupTable() {
+  const vtkSMPropertyHelper table(this, "LookupTable");
+  const bool isSet = table.GetNumberOfElements() > 0 && table.GetAsProxy() != nullptr;
+  return !isSet && this->Chosen.empty();
+}
+
 void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time, const Subject* before) {
   vtkSMPropertyHelper table(this, "LookupTable");
   vtkSMPropertyHelper scalars(this, "SelectInputScalars");
   const char* name = scalars.GetNumberOfElements() > 4 ? scalars.GetAsString(4) : nullptr;
-  const bool isSet = table.GetNumberOfElements() > 0 && table.GetAsProxy() != nullptr;
-  const bool wanted = before != nullptr || (!isSet && this->Chosen.empty());
+  const bool wanted = before != nullptr || this->LacksLookupTable();
   if (!wanted || name == nullptr || *name == '\0') return;
   vtkNew<vtkSMTransferFunctionManager> manager;
   vtkSMProxy* map = this->MapInView(name, scalars.GetAsInt(3));
@@ -593,6 +652,10 @@ vtkSMProxy* vtkSMVDIGeneratorProxy::MapInView(const std::string& name, int assoc
 
 bool vtkSMVDIGeneratorProxy::RangeOfScalars(const char* name, int association, std::optional<double> time,
                                             double range[2]) {
+  if (this->OfRanks) {
+    std::ranges::copy(this->OfRanks->Range, range);
+    return range[0] <= range[1];
+  }
   range[0] = std::numeric_limits<double>::infinity();
   range[1] = -std::numeric_limits<double>::infinity();
   vtkSMPropertyHelper input(this, "Input");
@@ -616,5 +679,5 @@ bool vtkSMVDIGeneratorProxy::RangeOfScalars(const char* name, int association, s
       }
     }
   }
-  return WidenOverRanks(range) && range[0] <= range[1];
+  return range[0] <= range[1];
 }

@@ -19,6 +19,9 @@
  * After the first update, another array, component or input takes its own map as soon as it is sent
  * (UpdateVTKObjects). So the next update finds it, whether it is a view's or a writer's. The proxy replaces
  * only the map of the previous array. Another input brings its unit distance, unless a user has set one.
+ *
+ * If each rank has a client (pvbatch --symmetric, Catalyst), the proxy's next update, or that of a writer
+ * downstream, does all this: the ranks meet there, and each script may set other properties.
  */
 #ifndef vtkSMVDIGeneratorProxy_h
 #define vtkSMVDIGeneratorProxy_h
@@ -26,7 +29,7 @@
 #include <vtkSMSourceProxy.h>
 #include <vtkWeakPointer.h>
 
-#include <map>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -36,6 +39,7 @@ namespace vdi {
 struct Box;
 struct VdiEstimate;
 }  // namespace vdi
+class vtkMultiProcessController;
 class vtkPVDataInformation;
 class vtkSMRenderViewProxy;
 class vtkSMViewProxy;
@@ -100,8 +104,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   static void PrepareUpstream(vtkSMProxy* proxy, std::optional<double> time);
 
  protected:
-  vtkSMVDIGeneratorProxy() = default;
-  ~vtkSMVDIGeneratorProxy() override = default;
+  vtkSMVDIGeneratorProxy();
+  ~vtkSMVDIGeneratorProxy() override;
 
  private:
   vtkSMVDIGeneratorProxy(const vtkSMVDIGeneratorProxy&) = delete;
@@ -117,7 +121,14 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
     bool operator==(const Subject&) const = default;
   };
 
+  /// Collective if each rank has a client.
   void TakeWhatIsNotSet(std::optional<double> time);
+  /// Collective, called where each rank has a client. Returns whether all have the same array and component.
+  /// Then `OfRanks` is set if any client needs it. Otherwise the filter executes on all ranks, and reports
+  /// the difference.
+  bool MeetRanks(vtkMultiProcessController* ranks, std::optional<double> time);
+  /// Collective: updates the input, and sets `OfRanks`. Returns false if another rank doesn't take part.
+  bool GatherInput(vtkMultiProcessController* ranks, const Subject& subject, std::optional<double> time);
   void TakeFromView();
   vtkSMViewProxy* ActiveView();
   /// The active view if the proxy may take properties from it; null otherwise.
@@ -129,8 +140,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   vdi::Box ShownBounds();
   /// The view's representation of the input; null if there is none.
   vtkSMProxy* RepresentationIn(vtkSMViewProxy* view);
-  /// The number of components of the input's array; 0 if the array is missing. Collective if each rank has a
-  /// client: the largest number.
+  /// The number of components of the input's array; 0 if the array is missing.
   int ComponentsOf(const std::string& name, int association);
   /// `time` is that of the next update, if it has one. With `before`, the map that is set belongs to that
   /// other array, component or input.
@@ -142,7 +152,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   bool NameComponent(vtkSMProxy* map, const std::string& name, int association, const Subject* before);
   /// The map by which the active view colours the input by that array; null if it doesn't.
   vtkSMProxy* MapInView(const std::string& name, int association);
-  /// The range of the input's array over all ranks. Returns false if there is none.
+  /// Whether no map has been set or chosen.
+  bool LacksLookupTable();
+  /// The range of the input's array. Returns false if there is none.
   bool RangeOfScalars(const char* name, int association, std::optional<double> time, double range[2]);
 
   Subject CurrentSubject();
@@ -155,7 +167,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   vtkWeakPointer<vtkSMProxy> ChosenMap;     // that map
   std::optional<Subject> Shown;             // the subject of the last map
   std::optional<double> TakenUnitDistance;  // taken from a view
-  std::map<std::string, int> Components;  // each input array's components, as the ranks' clients have agreed
+  struct InputOfRanks;
+  std::unique_ptr<InputOfRanks> OfRanks;  // if each rank has a client, and the last update needed it
 };
 
 #endif
