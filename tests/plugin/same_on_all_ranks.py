@@ -98,6 +98,19 @@ texts = errors_of(cropped)
 check(not texts and cropped.Cropping == 1, "rank %d: a cropped volume is rendered: %s" % (rank, texts))
 check(list(cropped.CroppingBox) == [-3, 5, -4, 4, -4, 4], "rank %d: its box is %s" % (rank, list(cropped.CroppingBox)))
 
+# A view that is drawn next shows another array, component and map, too.
+shown = simple.CreateRenderView(ViewSize=[64, 48])
+simple.Show(vectors, shown)
+simple.Render(shown)
+vectors.Component = 2
+simple.Render(shown)
+check(range_of(vectors.LookupTable) == [0, 5], "rank %d: the view's component has its range %s" % (
+    rank, range_of(vectors.LookupTable)))
+vectors.SelectInputScalars = ["POINTS", "velocity"]
+simple.Render(shown)
+check(range_of(vectors.LookupTable) == [0, 3], "rank %d: the view's array has its range %s" % (
+    rank, range_of(vectors.LookupTable)))
+
 # Rank 0 alone makes the output. It refuses an array's name that is too long for a file.
 NAME = "x" * 2 ** 20
 named = simple.Calculator(Input=wavelet, Function="RTData", ResultArrayName=NAME)

@@ -1,6 +1,7 @@
 #include "vtkSMVDIGeneratorProxy.h"
 
 #include <vtkCamera.h>
+#include <vtkCommand.h>
 #include <vtkCommunicator.h>
 #include <vtkDataObject.h>
 #include <vtkMultiProcessController.h>
@@ -14,6 +15,7 @@
 #include <vtkSMInputProperty.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMProxy.h>
+#include <vtkSMProxyIterator.h>
 #include <vtkSMProxySelectionModel.h>
 #include <vtkSMRenderViewProxy.h>
 #include <vtkSMRepresentationProxy.h>
@@ -223,7 +225,7 @@ void vtkSMVDIGeneratorProxy::UpdatePipeline(double time) {
 void vtkSMVDIGeneratorProxy::UpdateVTKObjects() {
   this->Superclass::UpdateVTKObjects();
   // Where each rank has a client, only some of their scripts may set this property. The ranks meet in the
-  // next update.
+  // next update, or when a view is drawn.
   if (this->Taken && !this->Choosing && ranksWithClients() == nullptr) this->FollowArray();
 }
 
@@ -241,6 +243,7 @@ void vtkSMVDIGeneratorProxy::LoadState(const vtkSMMessage* state, vtkSMProxyLoca
 
 void vtkSMVDIGeneratorProxy::TakeWhatIsNotSet(std::optional<double> time) {
   if (vtkMultiProcessController* ranks = ranksWithClients()) {
+    this->WatchViews();
     if (!this->MeetRanks(ranks, time)) return;
     if (this->Taken) this->FollowArray();
   }
@@ -249,6 +252,23 @@ void vtkSMVDIGeneratorProxy::TakeWhatIsNotSet(std::optional<double> time) {
   const Set choosing(this->Choosing);
   this->ChooseLookupTable(time, nullptr);
   this->Shown = this->CurrentSubject();
+}
+
+void vtkSMVDIGeneratorProxy::WatchViews() {
+  vtkNew<vtkSMProxyIterator> views;
+  views->SetSessionProxyManager(this->GetSessionProxyManager());
+  views->SetModeToOneGroup();
+  for (views->Begin("views"); views->IsAtEnd() == 0; views->Next()) {
+    vtkSMProxy* view = views->GetProxy();
+    const auto isView = [view](const vtkSMProxy* watched) { return watched == view; };
+    if (std::ranges::any_of(this->Watched, isView)) continue;
+    view->AddObserver(vtkCommand::StartEvent, this, &vtkSMVDIGeneratorProxy::BeforeRender);
+    this->Watched.emplace_back(view);
+  }
+}
+
+void vtkSMVDIGeneratorProxy::BeforeRender() {
+  if (!this->Choosing) this->TakeWhatIsNotSet(std::nullopt);
 }
 
 bool vtkSMVDIGeneratorProxy::MeetRanks(vtkMultiProcessController* ranks, std::optional<double> time) {

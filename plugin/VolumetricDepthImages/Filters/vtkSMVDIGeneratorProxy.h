@@ -20,8 +20,9 @@
  * (UpdateVTKObjects). So the next update finds it, whether it is a view's or a writer's. The proxy replaces
  * only the map of the previous array. Another input brings its unit distance, unless a user has set one.
  *
- * If each rank has a client (pvbatch --symmetric, Catalyst), the proxy's next update, or that of a writer
- * downstream, does all this: the ranks meet there, and each script may set other properties.
+ * If each rank has a client (pvbatch --symmetric, Catalyst), the next view that is drawn, or the next update
+ * of the proxy or of a writer downstream, does all this: the ranks meet there, and each script may set other
+ * properties.
  */
 #ifndef vtkSMVDIGeneratorProxy_h
 #define vtkSMVDIGeneratorProxy_h
@@ -32,6 +33,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "vtkVolumetricDepthImagesModule.h"
 
@@ -129,6 +131,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   bool MeetRanks(vtkMultiProcessController* ranks, std::optional<double> time);
   /// Collective: updates the input, and sets `OfRanks`. Returns false if another rank doesn't take part.
   bool GatherInput(vtkMultiProcessController* ranks, const Subject& subject, std::optional<double> time);
+  /// Calls TakeWhatIsNotSet when a view is drawn: views don't update the proxy. Called where each rank has a
+  /// client.
+  void WatchViews();
+  void BeforeRender();
   void TakeFromView();
   vtkSMViewProxy* ActiveView();
   /// The active view if the proxy may take properties from it; null otherwise.
@@ -169,6 +175,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   std::optional<double> TakenUnitDistance;  // taken from a view
   struct InputOfRanks;
   std::unique_ptr<InputOfRanks> OfRanks;  // if each rank has a client, and the last update needed it
+  std::vector<vtkWeakPointer<vtkSMProxy>> Watched;  // the views that BeforeRender observes
 };
 
 #endif
