@@ -281,6 +281,7 @@ std::vector<std::pair<std::string, JsonValue>> JsonValue::members() const {
   const auto* nodes = std::get_if<JsonNode::Members>(&node_->value);
   if (nodes == nullptr) fail("must be an object");
   std::vector<std::pair<std::string, JsonValue>> values;
+  values.reserve(nodes->size());
   for (const auto& [name, node] : *nodes) values.emplace_back(name, child(node, escaped(name)));
   return values;
 }

@@ -42,6 +42,7 @@ double rounded(double milliseconds) {
 
 std::string listOf(const std::vector<std::string>& texts) {
   std::vector<std::string> items;
+  items.reserve(texts.size());
   for (const std::string& text : texts) items.push_back(jsonOf(text));
   return io::jsonListOf(items);
 }

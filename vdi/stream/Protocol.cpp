@@ -84,8 +84,10 @@ JsonObject messageOf(const char* type) {
 
 void addSeries(JsonObject& object, const Series& series) {
   std::vector<std::string> times;
+  times.reserve(series.times.size());
   for (const std::optional<double>& time : series.times) times.push_back(numberOrNull(time));
   std::vector<std::string> steps;
+  steps.reserve(series.steps.size());
   for (const std::uint64_t step : series.steps) steps.push_back(jsonOf(step));
   object.add("times", jsonListOf(times)).add("steps", jsonListOf(steps));
 }

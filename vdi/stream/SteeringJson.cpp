@@ -144,6 +144,7 @@ std::string jsonOf(const Parameter& parameter) {
 
 std::string jsonOf(const GeneratorControls& controls) {
   std::vector<std::string> presets;
+  presets.reserve(controls.presets.size());
   for (const std::string& preset : controls.presets) presets.push_back(jsonOf(preset));
   JsonObject object;
   object.add("resolution", pairOf(controls.resolution));
@@ -200,6 +201,7 @@ Wish wishIn(const JsonValue& object) {
 
 void addControls(JsonObject& object, const Controls& controls) {
   std::vector<std::string> parameters;
+  parameters.reserve(controls.parameters.size());
   for (const Parameter& parameter : controls.parameters) parameters.push_back(jsonOf(parameter));
   object.add("period", jsonOf(controls.period)).add("paused", jsonFlag(controls.paused));
   object.add("parameters", jsonListOf(parameters));
