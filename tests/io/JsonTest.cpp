@@ -1,8 +1,11 @@
 // JSON with source positions: refusals name the position, and a hostile document costs little.
 #include <sys/stat.h>
 
+#include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <string>
 
 #include "tests/Catch.h"
@@ -29,6 +32,23 @@ TEST_CASE("values of a document") {
   CHECK(value.at("b").at("d").text() == "x");
   CHECK_FALSE(value.find("z"));
   CHECK(value.at("a").items()[0].whole(0, 5) == 1);
+}
+
+TEST_CASE("whole numbers are exact, also beyond 2^53") {
+  const std::string text =
+      "[9007199254740993, 9223372036854775807, 9223372036854775808, 18446744073709551615, "
+      "18446744073709551616, -1, 1.0]";
+  const auto items = parseJson(text, "x.json").items();
+  constexpr auto most = std::numeric_limits<std::uint64_t>::max();
+  CHECK(items[0].count(most) == 9007199254740993U);
+  CHECK(items[1].count(most) == most / 2);
+  CHECK(items[2].count(most) == most / 2 + 1);
+  CHECK(items[3].count(most) == most);
+  CHECK(items[3].number() == std::ldexp(1.0, 64));
+  CHECK_THROWS_WITH(items[3].count(most - 1),
+                    "/3: must be a whole number from 0 to 18446744073709551614 (x.json, line 1)");
+  CHECK_THROWS_AS(items[3].whole(0, std::numeric_limits<std::int64_t>::max()), Error);
+  for (std::size_t i = 4; i < items.size(); ++i) CHECK_THROWS_AS(items[i].count(most), Error);
 }
 
 TEST_CASE("a mistake has the pointer and the line of its value") {

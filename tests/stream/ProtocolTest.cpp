@@ -61,6 +61,7 @@ const std::vector<FromServer>& serverMessages() {
       Welcome{1, "abc", false, std::nullopt, 3},
       Welcome{1, "abc", true, Series{{0.5, std::nullopt, -1e300}, {1, 2, std::uint64_t{1} << 60U}}, 1, 15},
       SeriesPart{4096, Series{{2.0}, {9}}},
+      SeriesPart{0, Series{{2.0, 3.0}, {(std::uint64_t{1} << 53U) + 1, std::uint64_t{0} - 1}}},
       State{Phase::Waiting, 0, {}},
       State{Phase::Live, 8, {}},
       State{Phase::Ended, 1, {}},

@@ -21,7 +21,10 @@ namespace vdi::io {
 struct JsonNode {
   using Members = std::vector<std::pair<std::string, JsonNode>>;
   std::size_t line = 1;
-  std::variant<std::monostate, bool, std::int64_t, double, std::string, std::vector<JsonNode>, Members> value;
+  // A whole number is unsigned only beyond std::int64_t.
+  std::variant<std::monostate, bool, std::int64_t, std::uint64_t, double, std::string, std::vector<JsonNode>,
+               Members>
+      value;
 };
 
 namespace {
@@ -82,7 +85,7 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
   bool number_integer(number_integer_t value) override { return addNumber(std::int64_t{value}); }
   bool number_unsigned(number_unsigned_t value) override {
     constexpr auto most = static_cast<number_unsigned_t>(std::numeric_limits<std::int64_t>::max());
-    if (value > most) return addNumber(static_cast<double>(value));
+    if (value > most) return addNumber(std::uint64_t{value});
     return addNumber(static_cast<std::int64_t>(value));
   }
   bool number_float(number_float_t value, const string_t&) override { return addNumber(value); }
@@ -238,6 +241,7 @@ void JsonValue::requireObject(const std::vector<std::string>& known) const {
 
 double JsonValue::number() const {
   if (const auto* whole = std::get_if<std::int64_t>(&node_->value)) return static_cast<double>(*whole);
+  if (const auto* large = std::get_if<std::uint64_t>(&node_->value)) return static_cast<double>(*large);
   const auto* number = std::get_if<double>(&node_->value);
   if (number == nullptr || !std::isfinite(*number)) fail("must be a number");
   return *number;
@@ -255,6 +259,15 @@ std::int64_t JsonValue::whole(std::int64_t least, std::int64_t most) const {
   if (value == nullptr || *value < least || *value > most)
     fail(fmt::format("must be a whole number from {} to {}", least, most));
   return *value;
+}
+
+std::uint64_t JsonValue::count(std::uint64_t most) const {
+  std::optional<std::uint64_t> count;
+  if (const auto* large = std::get_if<std::uint64_t>(&node_->value)) count = *large;
+  const auto* whole = std::get_if<std::int64_t>(&node_->value);
+  if (whole != nullptr && *whole >= 0) count = static_cast<std::uint64_t>(*whole);
+  if (!count || *count > most) fail(fmt::format("must be a whole number from 0 to {}", most));
+  return *count;
 }
 
 bool JsonValue::flag() const {

@@ -45,6 +45,7 @@ class JsonValue {
   double number() const;  // finite
   double number(double least, double most) const;
   std::int64_t whole(std::int64_t least, std::int64_t most) const;
+  std::uint64_t count(std::uint64_t most) const;  // a whole number from 0 to `most`
   bool flag() const;
   const std::string& text() const;
   std::vector<JsonValue> items() const;

@@ -1,6 +1,5 @@
 #include "vdi/stream/Protocol.h"
 
-#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -31,9 +30,7 @@ JsonValue parsed(std::string_view text, std::size_t mostBytes) {
 template <typename Integer>
 Integer countIn(const JsonValue& value) {
   // JavaScript writes whole numbers up to 2^53 without a point.
-  constexpr std::uint64_t most = std::numeric_limits<std::int64_t>::max();
-  constexpr std::uint64_t bound = std::min<std::uint64_t>(most, std::numeric_limits<Integer>::max());
-  return static_cast<Integer>(value.whole(0, static_cast<std::int64_t>(bound)));
+  return static_cast<Integer>(value.count(std::numeric_limits<Integer>::max()));
 }
 
 /// Reads the fields of a message.
