@@ -59,11 +59,12 @@ void inOrder(std::size_t count, std::size_t ahead, const MakeWorker& makeWorker,
     }
   };
 
-  std::vector<std::future<void>> helpers;
   const std::size_t threads = std::min({usableCores(), mostThreads, count});
-  while (helpers.size() + 1 < threads)
-    helpers.push_back(std::async(std::launch::async | std::launch::deferred, help));
+  std::vector<std::future<void>> helpers;
+  helpers.reserve(threads);  // a future without room would wait for its thread before `end` is called
   try {
+    while (helpers.size() + 1 < threads)
+      helpers.push_back(std::async(std::launch::async | std::launch::deferred, help));
     auto make = makeWorker();
     std::unique_lock lock(mutex);
     while (taken < count && !isEnding) {
