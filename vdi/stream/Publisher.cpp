@@ -72,8 +72,17 @@ void Publisher::encode(const Pending& pending) {
       return !pending_;
     });
   } catch (const std::exception& error) {
-    const std::scoped_lock lock(mutex_);
-    if (trouble_.empty()) trouble_ = error.what();
+    note(error);
+  }
+}
+
+void Publisher::note(const std::exception& error) noexcept {
+  const std::scoped_lock lock(mutex_);
+  if (!trouble_.empty()) return;
+  try {
+    trouble_ = error.what();
+  } catch (const std::exception&) {
+    trouble_ = "no memory";  // short enough to need none
   }
 }
 

@@ -3,6 +3,7 @@
 
 #include <condition_variable>
 #include <cstdint>
+#include <exception>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -39,6 +40,8 @@ class Publisher {
   };
   void work();
   void encode(const Pending& pending);
+  /// Keeps the error's text for trouble(), unless an earlier one is there.
+  void note(const std::exception& error) noexcept;
 
   Server& server_;
   std::uint32_t nextId_ = 0;  // only the thread uses it

@@ -94,6 +94,7 @@ class Server::Impl {
       context_.stop();
     }
     thread_.join();
+    dropConnections();
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -149,8 +150,12 @@ class Server::Impl {
         .add("frames", io::jsonOf(now.frames))
         .text();
   }
-  void say(const std::string& line) const {
-    if (options_.log) options_.log(line);
+  /// Never throws: without memory, the operator gets no line, and the thread goes on.
+  void say(const char* line) const noexcept {
+    try {
+      if (options_.log) options_.log(line);
+    } catch (const std::exception&) {
+    }
   }
 
   void listen() {
@@ -189,12 +194,18 @@ class Server::Impl {
     });
   }
 
-  /// Call after an exception, which may have come before the server accepted the next peer.
-  void acceptAnew() {
-    if (!acceptor_.is_open()) return;
-    acceptor_.cancel();
-    pause_.cancel();
-    accept();
+  /// Call after an exception, which may have come before the server accepted the next peer. Returns false
+  /// without memory: call it again.
+  bool acceptAnew() {
+    if (!acceptor_.is_open()) return true;
+    try {
+      acceptor_.cancel();
+      pause_.cancel();
+      accept();
+      return true;
+    } catch (const std::exception&) {
+      return false;
+    }
   }
 
   void serve(Plain::socket_type socket) {
@@ -258,6 +269,25 @@ class Server::Impl {
     });
   }
 
+  /// Call after the thread has ended. Connections that are left must go before the context: Beast's part of
+  /// its destructor would allocate memory for them, and the end of a connection uses the timers.
+  void dropConnections() noexcept {
+    boost::system::error_code ignored;
+    acceptor_.close(ignored);
+    for (auto at = connections_.begin(); at != connections_.end();) {
+      const std::shared_ptr<Connection> left = (at++)->second.lock();  // may be the last one to hold it
+      if (left) left->cut();
+    }
+    context_.restart();
+    for (bool isDone = connections_.empty(); !isDone;) {
+      try {
+        context_.poll();
+        isDone = true;
+      } catch (const std::exception&) {  // from one handler; the others still wait
+      }
+    }
+  }
+
   template <typename Do>
   void forEach(Do work) {
     const auto all = connections_;  // a copy, because some may leave
@@ -272,14 +302,17 @@ class Server::Impl {
   }
 
   void run() {
-    bool hasFailed = false;
-    for (bool done = false; !done;) {
+    bool accepts = true;
+    while (!context_.stopped()) {
       try {
-        if (std::exchange(hasFailed, false)) acceptAnew();
-        context_.run();
-        done = true;
+        accepts = accepts || acceptAnew();
+        if (accepts) {
+          context_.run();
+        } else {
+          context_.run_for(acceptPause);  // serves the peers that there are, or learns that the server ends
+        }
       } catch (const std::exception& error) {  // from one connection, which is lost, or for want of memory
-        hasFailed = true;
+        accepts = false;
         say(error.what());
         std::this_thread::sleep_for(failurePause);
       }

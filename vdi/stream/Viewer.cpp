@@ -97,8 +97,15 @@ bool Hub::isWanted(std::uint32_t index) const {
 
 void Hub::append(const Series& entries) {
   if (!series_) series_.emplace();
-  series_->times.insert(series_->times.end(), entries.times.begin(), entries.times.end());
-  series_->steps.insert(series_->steps.end(), entries.steps.begin(), entries.steps.end());
+  std::vector<std::optional<double>>& times = series_->times;
+  const std::size_t before = times.size();
+  times.insert(times.end(), entries.times.begin(), entries.times.end());
+  try {
+    series_->steps.insert(series_->steps.end(), entries.steps.begin(), entries.steps.end());
+  } catch (const std::exception&) {  // without memory; each step keeps its own time
+    times.resize(before);
+    throw;
+  }
   wakeAll();
 }
 
