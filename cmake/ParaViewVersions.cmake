@@ -7,6 +7,8 @@
 #   VDI_NEEDS_DISPLAY  whether its views need an X server; ParaView 6 draws them without one, too
 #   VDI_CONVERTS_ARRAYS  whether a filter that asks for cell data gets them from the points of a simulation's blocks, as
 #                      from ParaView 6 on
+#   VDI_COLORS_BY_PARTS  whether views of pvbatch --symmetric colour by an array that only some ranks have; ParaView 6.1's
+#                      ranks lose each other
 #   VDI_PLUGIN_UNITY   whether a unity build compiles the plugin's sources together
 
 # vdi_pass_over_python_modules(<folder of a ParaView's CMake files>): makes CMake accept Debian 13's
@@ -56,6 +58,7 @@ if(VDI_QT STREQUAL "Qt6" AND ParaView_VERSION VERSION_LESS 6)
 endif()
 set(VDI_NEEDS_DISPLAY ON)
 set(VDI_CONVERTS_ARRAYS OFF)
+set(VDI_COLORS_BY_PARTS ON)
 set(VDI_PLUGIN_UNITY "${CMAKE_UNITY_BUILD}")
 if(ParaView_VERSION VERSION_GREATER_EQUAL 5.12)
   set(VDI_PLUGIN_UNITY OFF) # the header that it generates has no include guard
@@ -63,6 +66,7 @@ endif()
 if(ParaView_VERSION VERSION_GREATER_EQUAL 6)
   set(VDI_NEEDS_DISPLAY OFF)
   set(VDI_CONVERTS_ARRAYS ON)
+  set(VDI_COLORS_BY_PARTS OFF)
 endif()
 set(VDI_GL_LOADER VTK::glew)
 if(TARGET VTK::glad)
