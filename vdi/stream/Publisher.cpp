@@ -10,10 +10,12 @@ namespace vdi::stream {
 
 namespace {
 
-/// Lets this thread, and those that it starts, yield to others. Linux has a niceness for each thread.
+/// Lets this thread, and those that it starts, yield to others. Linux has a niceness for each thread. A
+/// thread that yields more already stays as it is.
 void giveWay() {
   constexpr int niceness = 10;
-  (void)::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), niceness);
+  const auto thread = static_cast<id_t>(::gettid());
+  if (::getpriority(PRIO_PROCESS, thread) < niceness) (void)::setpriority(PRIO_PROCESS, thread, niceness);
 }
 
 }  // namespace
