@@ -18,10 +18,10 @@ extern "C" {
  *
  * `make_frames_of_pipelines` and `make_frames_of_json` are initialize_pipelines and initialize_json in the
  * processes that make an isolated run's frames. If `goes_on`, earlier processes have made a part of the run,
- * whose files stay. `set_clock`, which may be null, sets the
- * time, in seconds since the run's start, that counts for the next step. `log_left_out`, which may be null,
- * notes in the log, on the first rank, that the simulation didn't hand over a step, because two earlier
- * frames were still to be made. Neither is collective. */
+ * whose files stay. `set_clock`, which may be null, sets the time, in seconds since the run's start, that
+ * counts for the next step. `log_left_out`, which may be null, notes in the log, on the first rank, that the
+ * simulation didn't hand over a step, because two earlier frames were still to be made. Neither is
+ * collective. */
 typedef struct vdi_catalyst_functions {
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**);
   int (*initialize_pipelines)(int32_t, int32_t, const vdi_catalyst_pipeline*, vdi_catalyst**);

@@ -7,8 +7,8 @@
 #   VDI_NEEDS_DISPLAY  whether its views need an X server; ParaView 6 draws them without one, too
 #   VDI_CONVERTS_ARRAYS  whether a filter that asks for cell data gets them from the points of a simulation's blocks, as
 #                      from ParaView 6 on
-#   VDI_COLORS_BY_PARTS  whether views of pvbatch --symmetric colour by an array that only some ranks have; ParaView 6.1's
-#                      ranks lose each other
+#   VDI_COLORS_BY_PARTS  whether views of pvbatch --symmetric can colour by an array that only some
+#                        ranks have; with ParaView 6.1, such a run aborts
 #   VDI_PLUGIN_UNITY   whether a unity build compiles the plugin's sources together
 
 # vdi_pass_over_python_modules(<folder of a ParaView's CMake files>): makes CMake accept Debian 13's
