@@ -48,12 +48,6 @@ void makeFolderOf(const std::filesystem::path& file) {
 }
 
 /// The size of a file in bytes; 0 for a device.
-std::uint64_t sizeOfFile(const std::string& file) {
-  std::error_code error;
-  const std::uintmax_t bytes = std::filesystem::file_size(file, error);
-  return error ? 0 : bytes;
-}
-
 runlog::LogFiles logFilesOf(const config::RunLogFiles& names) {
   runlog::LogFiles files;
   if (!names.json.empty()) files.json = names.json;
@@ -295,7 +289,7 @@ void RunEngine::leaveOut(std::int64_t step, double time, bool& hasTold,
 void RunEngine::logLeftOut(std::int64_t step, double time) noexcept {
   if (!state_->log) return;
   try {
-    state_->log->add(runlog::LeftOut{step, time, "two earlier frames were still to be made"});
+    state_->log->addNotHandedOver(step, time);
   } catch (const std::exception& error) {  // the other ranks don't know of it, and no step fails
     std::fprintf(stderr, "vdi_catalyst: step %lld: %s\n", static_cast<long long>(step), error.what());
   }
@@ -561,7 +555,7 @@ void RunEngine::save(Vdi vdi, const config::RunCamera& camera, bool isForFiles, 
   }
   if (state_->stream && &camera == run_.cameras.data())
     state_->stream->publish(std::make_shared<const Vdi>(std::move(vdi)));
-  for (const std::string& file : record.files) reports.front().bytesWritten += sizeOfFile(file);
+  for (const std::string& file : record.files) runlog::countFile(reports.front(), file);
   reports.front().outputSeconds += std::chrono::duration<double>(Clock::now() - start).count();
   runlog::setReports(record, reports);
 }

@@ -25,7 +25,6 @@
 #include <chrono>
 #include <cstdio>
 #include <exception>
-#include <filesystem>
 #include <regex>
 #include <stdexcept>
 #include <string_view>
@@ -255,9 +254,7 @@ class FrameCollector {
       report.outputSeconds += output.seconds;
       found->dropped += output.dropped;
       if (output.file.empty()) return;
-      std::error_code error;
-      const std::uintmax_t bytes = std::filesystem::file_size(output.file, error);
-      if (!error) report.bytesWritten += bytes;
+      runlog::countFile(report, output.file);
       found->files.push_back(output.file);
     });
   }

@@ -74,7 +74,7 @@ void ScriptLog::add(const Step& step, std::vector<MadeFrame> frames, const std::
 }
 
 void ScriptLog::addLeftOut(std::int64_t step, double time) {
-  log_.add(runlog::LeftOut{step, time, "two earlier frames were still to be made"});
+  log_.addNotHandedOver(step, time);
 }
 
 std::string ScriptLog::finish() {

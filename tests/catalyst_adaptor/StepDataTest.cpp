@@ -29,6 +29,18 @@ vdi_catalyst_block blockAt(double x, int cells) {
   return block;
 }
 
+const std::array<float, 8> zeros{};
+
+/// A block of 2 x 2 x 2 cells with the array "E", whose values are zeros.
+Fields smallFields() {
+  Fields fields;
+  fields.setBlocks({blockAt(0.0, 2)});
+  fields.set(
+      Fields::arrayChange("E", true, VDI_CATALYST_F32,
+                          {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F32, true, 1, zeros.data())}));
+  return fields;
+}
+
 /// A step's bytes, aligned as pages are.
 struct Bytes {
   explicit Bytes(const StepWriter& writer) : words((writer.bytes() + 7) / 8) {
@@ -149,12 +161,7 @@ TEST_CASE("steps that are left out arrive with their times") {
 }
 
 TEST_CASE("a step that is cut short is refused") {
-  Fields fields;
-  fields.setBlocks({blockAt(0.0, 2)});
-  const std::array<float, 8> numbers{};
-  fields.set(
-      Fields::arrayChange("E", true, VDI_CATALYST_F32,
-                          {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F32, true, 1, numbers.data())}));
+  Fields fields = smallFields();
   const StepFields step = stepOf(fields);
   const Bytes bytes(StepWriter(1, fields.blocks(), step, {}));
   for (const std::size_t size : {0U, 7U, 20U, 100U}) {
@@ -163,17 +170,12 @@ TEST_CASE("a step that is cut short is refused") {
 }
 
 TEST_CASE("a step whose values would lie outside its memory is refused") {
-  Fields fields;
-  fields.setBlocks({blockAt(0.0, 2)});
-  const std::array<float, 8> numbers{};
-  fields.set(
-      Fields::arrayChange("E", true, VDI_CATALYST_F32,
-                          {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F32, true, 1, numbers.data())}));
+  Fields fields = smallFields();
   vdi_catalyst_particles given{};
   given.count = 7;
   given.position_type = VDI_CATALYST_F32;
   given.position_stride = sizeof(float);
-  for (const void*& position : given.positions) position = numbers.data();
+  for (const void*& position : given.positions) position = zeros.data();
   fields.set(Fields::particlesChange("stars", particleArrayOf(&given)));
   Bytes bytes(StepWriter(1, fields.blocks(), stepOf(fields), {}));
   const std::span<std::byte> all = std::as_writable_bytes(std::span(bytes.words));

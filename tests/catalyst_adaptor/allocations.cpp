@@ -19,6 +19,7 @@
 #include <string_view>
 
 #include "catalyst_adaptor/vdi_catalyst.h"
+#include "tests/AllocationOperators.h"
 
 namespace {
 
@@ -32,46 +33,16 @@ bool isAdaptors(const void* address) {
          std::string_view(info.dli_fname).find("libvdi_catalyst_") != std::string_view::npos;
 }
 
-void* allocated(std::size_t bytes, const void* caller) {
+}  // namespace
+
+// The engines, which are loaded later, use the operators that call this, because the program's symbols come
+// first.
+void* vdi::test::allocate(std::size_t bytes, const void* caller) noexcept {
   if (toGo > 0 && isAdaptors(caller) && --toGo == 0) {
     hasFailed = true;
     return nullptr;
   }
   return std::malloc(bytes > 0 ? bytes : 1);
-}
-
-void* allocatedOrThrown(std::size_t bytes, const void* caller) {
-  void* memory = allocated(bytes, caller);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-
-}  // namespace
-
-// The engines, which are loaded later, use these operators, because the program's symbols come first.
-void* operator new(std::size_t bytes) {
-  return allocatedOrThrown(bytes, __builtin_return_address(0));
-}
-void* operator new[](std::size_t bytes) {
-  return allocatedOrThrown(bytes, __builtin_return_address(0));
-}
-void* operator new(std::size_t bytes, const std::nothrow_t&) noexcept {
-  return allocated(bytes, __builtin_return_address(0));
-}
-void* operator new[](std::size_t bytes, const std::nothrow_t&) noexcept {
-  return allocated(bytes, __builtin_return_address(0));
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete[](void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-void operator delete[](void* memory, std::size_t) noexcept {
-  std::free(memory);
 }
 
 namespace {

@@ -23,6 +23,7 @@
 #include <variant>
 #include <vector>
 
+#include "tests/AllocationOperators.h"
 #include "tests/io/Samples.h"
 #include "vdi/core/InOrder.h"
 #include "vdi/stream/Client.h"
@@ -54,17 +55,6 @@ bool isServing() {
          ::getpriority(PRIO_PROCESS, self) > niceness;
 }
 
-void* allocated(std::size_t bytes) {
-  if (isArmed && isServing()) {
-    const std::int64_t left = --toGo;
-    if (left <= 0 && left > -inTurn) {
-      hasFailed = true;
-      return nullptr;
-    }
-  }
-  return std::malloc(bytes > 0 ? bytes : 1);
-}
-
 /// Lets allocations from the n-th on fail, `count` in turn.
 void arm(std::int64_t n, std::int64_t count) {
   hasFailed = false;
@@ -87,37 +77,17 @@ bool failsWithin(std::int64_t n, std::int64_t count, Work work) {
   return hasFailed;
 }
 
-void* allocatedOrThrown(std::size_t bytes) {
-  void* memory = allocated(bytes);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-
 }  // namespace
 
-void* operator new(std::size_t bytes) {
-  return allocatedOrThrown(bytes);
-}
-void* operator new[](std::size_t bytes) {
-  return allocatedOrThrown(bytes);
-}
-void* operator new(std::size_t bytes, const std::nothrow_t&) noexcept {
-  return allocated(bytes);
-}
-void* operator new[](std::size_t bytes, const std::nothrow_t&) noexcept {
-  return allocated(bytes);
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete[](void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-void operator delete[](void* memory, std::size_t) noexcept {
-  std::free(memory);
+void* vdi::test::allocate(std::size_t bytes, const void* /*caller*/) noexcept {
+  if (isArmed && isServing()) {
+    const std::int64_t left = --toGo;
+    if (left <= 0 && left > -inTurn) {
+      hasFailed = true;
+      return nullptr;
+    }
+  }
+  return std::malloc(bytes > 0 ? bytes : 1);
 }
 
 namespace {

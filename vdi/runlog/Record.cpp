@@ -184,6 +184,12 @@ std::vector<StageTime> stagesOf(std::span<const RankReport> reports) {
   return times;
 }
 
+void countFile(RankReport& report, const std::string& file) {
+  std::error_code error;
+  const std::uintmax_t bytes = std::filesystem::file_size(file, error);
+  if (!error) report.bytesWritten += bytes;
+}
+
 void setReports(FrameRecord& record, std::span<const RankReport> reports) {
   record.stages = stagesOf(reports);
   for (const RankReport& report : reports) {

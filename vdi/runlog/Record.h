@@ -57,6 +57,8 @@ struct FrameRecord {
   bool operator==(const FrameRecord&) const = default;
 };
 
+/// Adds the size of a written file to the report of its rank; a file that is gone adds nothing.
+void countFile(RankReport& report, const std::string& file);
 /// Fills in stages, bytes and memory from all ranks' reports.
 void setReports(FrameRecord& record, std::span<const RankReport> reports);
 

@@ -118,6 +118,10 @@ void RunLog::add(const LeftOut& frame) {
   append(jsonLine(frame), textLine(frame));
 }
 
+void RunLog::addNotHandedOver(std::int64_t step, double time) {
+  add(LeftOut{step, time, "two earlier frames were still to be made"});
+}
+
 RunSummary RunLog::finish() {
   summary_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   append(jsonLine(summary_), textLine(summary_));

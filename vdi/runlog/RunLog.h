@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -32,6 +33,9 @@ class RunLog {
   /// Appends a line to each file. Throws Error{Io} if that fails for one, after the other file got its line.
   void add(const FrameRecord& record);
   void add(const LeftOut& frame);  // throws as above
+  /// Appends a line for a step that the simulation of an isolated run didn't hand over, because two earlier
+  /// frames were still to be made. Throws as above.
+  void addNotHandedOver(std::int64_t step, double time);
   const RunSummary& soFar() const { return summary_; }
   /// Appends the summary, and returns it. Throws as add.
   RunSummary finish();

@@ -59,9 +59,8 @@ std::optional<vdi::MadeVdi> madeOf(vtkImageData* image, const vdi::GenerateSetti
   return made;
 }
 
-void noteFrame(const FrameMade& frame) {
-  FrameMade data = frame;
-  invoke(FrameMade::event, &data);
+void noteFrame(FrameMade frame) {
+  invoke(FrameMade::event, &frame);
 }
 
 void noteOutput(vtkAlgorithm* writer, OutputMade output) {

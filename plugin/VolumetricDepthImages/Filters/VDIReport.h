@@ -23,7 +23,7 @@ std::optional<vdi::MadeVdi> madeOf(vtkImageData* image, const vdi::GenerateSetti
                                    const std::vector<vdi::RankReport>& reports);
 
 /// Invoke the events of VDIRecords.h. The second one fills in the filter upstream of the writer.
-void noteFrame(const FrameMade& frame);
+void noteFrame(FrameMade frame);
 void noteOutput(vtkAlgorithm* writer, OutputMade output);
 
 }  // namespace pv
