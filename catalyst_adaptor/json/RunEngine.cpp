@@ -251,13 +251,15 @@ bool RunEngine::hasWallTime(std::int64_t step, double time) {
 bool RunEngine::hasHostMemory(std::int64_t step, double time) {
   State& state = *state_;
   if (!state.hostMemory.isSet()) return true;
+  config::HostMemoryBound::Use before;
   std::array<double, 1> most{};
-  state.comm.together([&] { most[0] = static_cast<double>(state.hostMemory.needed(memoryOfThisProcess())); });
+  state.comm.together([&] {
+    before = memoryOfThisProcess();
+    most[0] = static_cast<double>(state.hostMemory.needed(before));
+  });
   state.comm.allReduceMax(most);
   const auto needed = static_cast<std::uint64_t>(most[0]);
   if (state.hostMemory.hasRoom(needed)) return true;
-  config::HostMemoryBound::Use before;
-  state.comm.together([&] { before = memoryOfThisProcess(); });
   state.generator.reset();  // the next frame makes another one
   state.comm.together([&] { state.hostMemory.free(before, memoryOfThisProcess()); });
   leaveOut(step, time, state.hasToldOfMemory, [&] {

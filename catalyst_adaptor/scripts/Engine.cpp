@@ -325,6 +325,7 @@ struct Engine::State {
   }
   void start(int fortranCommunicator, const std::string& plugin);
   void watchPlugin();
+  void collectFrames();
   void ignorePlugin(vtkMultiProcessController& controller);
   std::optional<std::string> result(bool good);
 };
@@ -374,7 +375,13 @@ void Engine::State::watchPlugin() {
       asked.parameters.push_back({one.name, one.isWhole, one.value, one.low, one.high});
   });
   controller->AddObserver(pv::ParameterExchange::event, exchange);
+}
+
+void Engine::State::collectFrames() {
+  auto* controller = vtkMultiProcessController::GetGlobalController();
+  if (controller == nullptr) return;
   const auto collect = [&]<typename Data>(vtkCallbackCommand* command, const Data&) {
+    controller->RemoveObserver(command);  // an earlier run's
     command->SetClientData(&frames);
     command->SetCallback([](vtkObject*, unsigned long, void* client, void* data) {
       static_cast<FrameCollector*>(client)->add(*static_cast<const Data*>(data));
@@ -457,6 +464,10 @@ bool Engine::wants(int step, double time) const {
 
 Parameters& Engine::parameters() {
   return state_->parameters;
+}
+
+void Engine::collectFrames() {
+  state_->collectFrames();
 }
 
 std::vector<MadeFrame> Engine::takeFrames() {

@@ -61,6 +61,8 @@ class Engine {
   /// `step` >= 0.
   std::optional<std::string> execute(vtkDataObject* grid, int step, double time);
 
+  /// Collects the frames of each later `execute` for takeFrames. Not collective.
+  void collectFrames();
   /// The frames that the last `execute` has made, on the first rank, in their order. Other ranks get none.
   /// Not collective. Throws std::bad_alloc if there was no memory for one.
   std::vector<MadeFrame> takeFrames();

@@ -110,6 +110,7 @@ int openLog(vdi_catalyst& self, const std::vector<Script>& scripts, Place place)
     MPI_Comm_size(self.comm, &start.ranks);
     for (const Script& script : scripts) start.scripts.push_back(script.file);
     self.log = std::make_unique<ScriptLog>(*files, start);
+    self.engine->collectFrames();
   });
   if (code != VDI_CATALYST_OK) return code;
   int isLogged = self.log ? 1 : 0;
