@@ -311,7 +311,8 @@ class StreamSuite {
         sent.levels.push_back({1, mebibytesOf(files.back()), ssimOf(*vdi, *truth, settings)});
         sent.encodeMs = repeated(options_.repeats, [&vdi] {
                           return wallMs([&vdi] {
-                            stream::encodeFrame(*vdi, 0, Clock::now(), [](const auto&) { return true; });
+                            stream::encodeFrame(
+                                *vdi, 0, Clock::now(), [](const auto&) {}, [] { return true; });
                           });
                         }).median;
       });

@@ -30,10 +30,8 @@ TEST_CASE("a frame's levels are its VDI with fewer lists") {
   const std::vector<int> factors = stream::coarseFactorsOf(io::decodeInfo(file).expandedBytes);
   const stream::Clock::time_point made = stream::Clock::now();
   std::vector<FramePtr> encoded;
-  stream::encodeFrame(vdi, 7, made, [&](FramePtr frame) {
-    encoded.push_back(std::move(frame));
-    return true;
-  });
+  stream::encodeFrame(
+      vdi, 7, made, [&](FramePtr frame) { encoded.push_back(std::move(frame)); }, [] { return true; });
   REQUIRE(encoded.size() == (factors.empty() ? 1 : 2));
   CHECK(encoded.front()->levels.size() == std::max<std::size_t>(factors.size(), 1));
   FramePtr passed;
@@ -57,12 +55,18 @@ TEST_CASE("a frame's levels are its VDI with fewer lists") {
   }
 }
 
-TEST_CASE("the whole VDI isn't encoded where the next one waits") {
+TEST_CASE("the whole VDI is given up where the next one waits") {
+  const int chunks = GENERATE(0, 3);  // encoded before the next VDI comes
   int calls = 0;
-  stream::encodeFrame(test::noisyVdi(230, 120, 8), 0, stream::Clock::now(), [&](const FramePtr& frame) {
-    ++calls;
-    CHECK(frame->levels.size() == 1);
-    return false;
-  });
+  int asked = 0;
+  stream::encodeFrame(
+      test::noisyVdi(230, 120, 8), 0, stream::Clock::now(),
+      [&](const FramePtr& frame) {
+        ++calls;
+        CHECK(frame->levels.size() == 1);
+        CHECK(asked == 0);
+      },
+      [&] { return asked++ < chunks; });
   CHECK(calls == 1);
+  CHECK(asked == chunks + 1);
 }

@@ -246,3 +246,28 @@ TEST_CASE("those who look at different frames of a series are within the bound t
     CHECK_FALSE(viewers.back()->viewer.isStalled());
   }
 }
+
+TEST_CASE("a line carries whole frames while they take less time than the simulation") {
+  const double mebibytesPerSecond = GENERATE(10.0, 30.0);
+  Hub::Options options = limited(1000 * mebibyte);
+  options.mostBytesPerSecond = mebibytesPerSecond * mebibyte;
+  Levels levels;
+  Hub hub(std::move(options));
+  CHECK(hub.carriesWholeFrames());  // as far as known
+  hub.publish(levels.frame(0), start);
+  CHECK_FALSE(hub.carriesWholeFrames());  // nobody looks
+  Connected viewer(hub);
+  CHECK(hub.carriesWholeFrames());
+  for (std::uint32_t id = 1; id < 5; ++id) {
+    const Clock::time_point now = start + id * 1s;
+    const FramePtr frame = levels.frame(id);
+    Frame coarse = *frame;
+    coarse.levels.pop_back();
+    hub.publish(std::make_shared<Frame>(coarse), now);
+    // 27 MiB, by the coarse level of 3 MiB.
+    if (id > 1) CHECK(hub.carriesWholeFrames() == (mebibytesPerSecond > 27.0));
+    hub.publish(frame, now);
+    viewer.takeAll(now);
+  }
+  CHECK(hub.carriesWholeFrames() == (mebibytesPerSecond > 20.0));
+}

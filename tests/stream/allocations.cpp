@@ -281,10 +281,9 @@ int converseWithoutMemory(std::int64_t count) {
   wish.parameters = {{"feed", 0.05}};
   const std::vector<std::string> said = saidMessages(wish);
   stream::FramePtr frame;
-  stream::encodeFrame(test::plausibleVdi(40, 30, 8), 1, stream::Clock::now(), [&](stream::FramePtr made) {
-    frame = std::move(made);
-    return true;
-  });
+  stream::encodeFrame(
+      test::plausibleVdi(40, 30, 8), 1, stream::Clock::now(),
+      [&](stream::FramePtr made) { frame = std::move(made); }, [] { return true; });
   int rounds = 0;
   while (failsWithin(rounds + 1, count, [&] { converse(said, controls, frame); })) ++rounds;
   return rounds;

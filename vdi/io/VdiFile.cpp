@@ -254,6 +254,10 @@ std::vector<std::byte> encodeTail(const Vdi& vdi) {
 }
 
 std::vector<std::byte> encode(const Vdi& vdi) {
+  return *encodeWhile(vdi, [] { return true; });
+}
+
+std::optional<std::vector<std::byte>> encodeWhile(const Vdi& vdi, const std::function<bool()>& goesOn) {
   requireSoundHeader(vdi);
   validateShape(vdi);
   validateEnds(vdi);
@@ -264,15 +268,21 @@ std::vector<std::byte> encode(const Vdi& vdi) {
                 chunkBytes(vdi.listCount(), vdi.supersegmentCount(), vdi.precision()));
   preferLargePages({bytes.data(), bytes.capacity()});
   bytes.resize(headBytes(vdi.listCount()));
+  struct GaveUp {};  // ends encodeChunks and its threads
   const auto append = [&](const EncodedChunk& chunk) {
+    if (!goesOn()) throw GaveUp();
     table.push_back(chunk.entry);
     bytes.insert(bytes.end(), chunk.bytes.begin(), chunk.bytes.end());
   };
-  std::visit(
-      [&](const auto& lists) {
-        encodeChunks(lists, 0, lists.listCount(), 0, vdi.budget, vdi.depthCode, append);
-      },
-      vdi.lists);
+  try {
+    std::visit(
+        [&](const auto& lists) {
+          encodeChunks(lists, 0, lists.listCount(), 0, vdi.budget, vdi.depthCode, append);
+        },
+        vdi.lists);
+  } catch (const GaveUp&) {
+    return std::nullopt;
+  }
   const std::vector<std::byte> head = encodeHead(vdi, table);
   std::copy(head.begin(), head.end(), bytes.begin());
   const std::vector<std::byte> tail = encodeTail(vdi);

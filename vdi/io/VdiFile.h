@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -25,6 +27,9 @@ struct VdiFileInfo {
 /// Encodes a VDI without loss in its precision, with LZ4 and checksums. Deterministic: equal VDIs give equal
 /// bytes on every machine (little-endian). Throws Error{Format} for a VDI that decode would refuse.
 std::vector<std::byte> encode(const Vdi& vdi);
+/// As encode, but calls `goesOn` on this thread before each chunk, and gives up once it returns false.
+/// Returns nothing then.
+std::optional<std::vector<std::byte>> encodeWhile(const Vdi& vdi, const std::function<bool()>& goesOn);
 /// Throws Error{Format} for bytes that are truncated, altered, of another version or encoding, or whose
 /// header or chunk table asks for more memory than the chunks can expand to (checked before allocation; they
 /// expand at most 255 times). The result has passed validate(Vdi).

@@ -1,5 +1,6 @@
 #include "vdi/stream/Frame.h"
 
+#include <optional>
 #include <utility>
 
 #include "vdi/core/Estimate.h"
@@ -33,16 +34,22 @@ std::vector<int> coarseFactorsOf(std::uint64_t bytes) {
 }
 
 void encodeFrame(const Vdi& vdi, std::uint32_t id, Clock::time_point made,
-                 const std::function<bool(FramePtr)>& take) {
+                 const std::function<void(FramePtr)>& take, const std::function<bool()>& goesOn) {
   const auto bytes = bytesInMemory<std::uint64_t>(vdi.listCount(), vdi.supersegmentCount(), vdi.precision());
   const std::vector<int> factors = coarseFactorsOf(bytes);
   Frame frame{id, vdi.timeStep, vdi.time, made, static_cast<std::uint32_t>(factors.size()) + 1, {}};
   // A coarse level has too few chunks to keep all cores busy, so all are made side by side.
   frame.levels.resize(factors.size());
   eachInParallel(factors.size(), [&](std::size_t i) { frame.levels[i] = levelOf(thinned(vdi, factors[i])); });
-  if (!factors.empty() && !take(std::make_shared<Frame>(frame))) return;
-  frame.levels.push_back(levelOf(vdi));
-  (void)take(std::make_shared<Frame>(std::move(frame)));
+  if (!factors.empty()) {
+    take(std::make_shared<Frame>(frame));
+    std::optional<std::vector<std::byte>> whole = io::encodeWhile(vdi, goesOn);
+    if (!whole) return;
+    frame.levels.push_back(levelOf(*std::move(whole), vdi));
+  } else {
+    frame.levels.push_back(levelOf(vdi));
+  }
+  take(std::make_shared<Frame>(std::move(frame)));
 }
 
 void passFrame(std::vector<std::byte> file, std::uint32_t id, Clock::time_point made,

@@ -103,6 +103,10 @@ double Outbox::rate() const {
   return std::min(cap_, measured);
 }
 
+bool Outbox::isFastEnoughFor(std::uint64_t bytes) const {
+  return period_ == 0.0 || rate() == 0.0 || static_cast<double>(bytes) <= rate() * period_;
+}
+
 std::uint64_t Outbox::window() const {
   const double wished = std::min(rate() * windowSeconds, static_cast<double>(largestWindow));
   return std::max(smallestWindow, static_cast<std::uint64_t>(wished));

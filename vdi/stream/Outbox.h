@@ -47,6 +47,8 @@ class Outbox {
   std::uint64_t dropped() const { return dropped_; }
   /// The bytes per second that the viewer takes, estimated from acknowledgements and the limit; 0: unknown.
   double rate() const;
+  /// Whether so many bytes take no longer than the time between frames, as far as known.
+  bool isFastEnoughFor(std::uint64_t bytes) const;
   /// Bytes sent and not acknowledged.
   std::uint64_t underWay() const { return underWay_; }
   /// Bytes that may be under way.

@@ -68,11 +68,12 @@ void Publisher::work() {
 
 void Publisher::encode(const Pending& pending) {
   try {
-    encodeFrame(*pending.vdi, nextId_++, pending.made, [this](FramePtr frame) {
-      server_.publish(std::move(frame));
+    const auto goesOn = [this] {
       const std::scoped_lock lock(mutex_);
-      return !pending_;
-    });
+      return !pending_ || server_.carriesWholeFrames();
+    };
+    const auto take = [this](FramePtr frame) { server_.publish(std::move(frame)); };
+    encodeFrame(*pending.vdi, nextId_++, pending.made, take, goesOn);
   } catch (const std::exception& error) {
     note(error);
   }

@@ -26,8 +26,8 @@ class Publisher {
   Publisher(const Publisher&) = delete;
   Publisher& operator=(const Publisher&) = delete;
 
-  /// Never waits. If the encoding of the last VDI hasn't begun, that VDI is dropped. If it has begun, the
-  /// levels that haven't been begun are dropped: the coarse levels of the new VDI come first.
+  /// Never waits. If the encoding of the last VDI hasn't begun, that VDI is dropped. If its coarse levels are
+  /// encoded, the full one is abandoned, unless some viewer could have it before the next frame.
   void publish(std::shared_ptr<const Vdi> vdi);
   std::uint64_t dropped() const;
   /// The error of the first VDI that couldn't be encoded; empty: none. Later VDIs are still encoded.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
@@ -110,6 +111,13 @@ class Server::Impl {
     asio::post(context_, std::move(work));
   }
   Hub& hub() { return hub_; }
+  void publish(FramePtr frame) {
+    onThread([this, held = std::move(frame)] {
+      hub_.publish(held, Clock::now());
+      carriesWholeFrames_ = hub_.carriesWholeFrames();
+    });
+  }
+  bool carriesWholeFrames() const { return carriesWholeFrames_; }
 
   /// Calls `question` on the server's thread and returns its answer.
   template <typename Answer>
@@ -325,6 +333,7 @@ class Server::Impl {
   Site site_;
   std::map<std::uint64_t, std::weak_ptr<Connection>> connections_;
   std::uint64_t nextNumber_ = 0;
+  std::atomic<bool> carriesWholeFrames_{true};
   bool isEnding_ = false;
   std::uint16_t port_ = 0;
   asio::io_context context_{1};  // must end before the members above, which its handlers' connections use
@@ -351,7 +360,11 @@ std::string Server::link() const {
 }
 
 void Server::publish(FramePtr frame) {
-  impl_->onThread([&hub = impl_->hub(), held = std::move(frame)] { hub.publish(held, Clock::now()); });
+  impl_->publish(std::move(frame));
+}
+
+bool Server::carriesWholeFrames() const {
+  return impl_->carriesWholeFrames();
 }
 
 void Server::provide(FramePtr frame) {

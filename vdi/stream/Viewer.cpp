@@ -39,6 +39,15 @@ void Hub::publish(FramePtr frame, Clock::time_point now) {
   wakeAll();
 }
 
+bool Hub::carriesWholeFrames() const {
+  if (!newest_ || newest_->levels.empty()) return true;
+  constexpr std::uint64_t listsForOne = std::uint64_t{coarseFactors.back()} * coarseFactors.back();
+  std::uint64_t bytes = newest_->levels.back()->bytes.size();
+  if (newest_->levels.size() < newest_->levelCount) bytes *= listsForOne;
+  return std::any_of(viewers_.begin(), viewers_.end(),
+                     [bytes](const Viewer* viewer) { return viewer->outbox_.isFastEnoughFor(bytes); });
+}
+
 void Hub::provide(const FramePtr& frame, Clock::time_point now) {
   for (Viewer* const viewer : viewers_) {
     if (viewer->shown_ == frame->id) viewer->offer(frame, now);

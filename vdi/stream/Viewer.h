@@ -61,6 +61,9 @@ class Hub {
   const std::optional<Series>& series() const { return series_; }
   std::uint32_t viewerCount() const { return static_cast<std::uint32_t>(viewers_.size()); }
   std::uint64_t published() const { return published_; }
+  /// Whether some viewer gets a frame as large as the newest one, in full, before the next one comes. Judges
+  /// a full level that isn't there yet by the finest coarse one.
+  bool carriesWholeFrames() const;
   State state() const { return {phase_, viewerCount(), cause_}; }
   /// The bytes of frames kept only because viewers still need them, without the newest frame.
   std::uint64_t heldBytes() const;
