@@ -111,6 +111,19 @@ TEST_CASE("messages are read as they were written") {
   CHECK_FALSE(std::get<Level>(serverMessage(textOf(FromServer(endless)))).time);
 }
 
+TEST_CASE("a close frame's reason ends between characters") {
+  const std::string room(123, 'a');
+  CHECK(stream::closeReason(room) == room);
+  CHECK(stream::closeReason(room + "b") == room);
+  const std::string sign = "\u20ac";  // three bytes
+  for (std::size_t before = 118; before <= 123; ++before) {
+    const std::string cause = std::string(before, 'a') + sign + "b";
+    const bool hasSign = before + sign.size() <= 123;
+    CHECK(stream::closeReason(cause) ==
+          cause.substr(0, hasSign ? std::min<std::size_t>(before + 4, 123) : before));
+  }
+}
+
 TEST_CASE("messages that make no sense are refused") {
   const std::vector<std::string> bad{
       "",

@@ -4,6 +4,7 @@
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/string_type.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/write.hpp>
@@ -12,8 +13,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <variant>
+
+#include "vdi/stream/Protocol.h"
 
 namespace vdi::stream {
 
@@ -228,11 +232,11 @@ class SocketConnection : public Connection, public std::enable_shared_from_this<
   }
 
   void put(const Viewer::Farewell& farewell) {
-    constexpr std::size_t longestReason = 123;  // RFC 6455, 5.5.1
     isWriting_ = true;
+    const std::string_view text = closeReason(farewell.cause);
     const boost::beast::websocket::close_reason reason(
         static_cast<boost::beast::websocket::close_code>(farewell.code),
-        farewell.cause.substr(0, longestReason));
+        boost::beast::string_view(text.data(), text.size()));
     socket_.async_close(reason, [self = shared_from_this()](Error) { self->end(); });
   }
 

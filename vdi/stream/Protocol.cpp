@@ -300,6 +300,15 @@ FromServer serverMessage(std::string_view text) {
   return Unknown{};
 }
 
+std::string_view closeReason(std::string_view cause) {
+  constexpr std::size_t longest = 123;  // RFC 6455, 5.5.1
+  if (cause.size() <= longest) return cause;
+  const auto isContinuation = [](char byte) { return (static_cast<unsigned char>(byte) & 0xc0U) == 0x80U; };
+  std::size_t end = longest;
+  while (end > 0 && isContinuation(cause[end])) --end;
+  return cause.substr(0, end);
+}
+
 std::array<std::byte, chunkHeadBytes> chunkHead(const Chunk& chunk) {
   std::array<std::byte, chunkHeadBytes> head{};
   std::memcpy(head.data(), &chunk.frame, sizeof(chunk.frame));

@@ -44,6 +44,9 @@ enum class Close : std::uint16_t {
   Stalled = 4410,
   TooMany = 4503,
 };
+/// As much of a cause in UTF-8 as a close frame has room for. Ends between characters, because browsers give
+/// up a frame whose text isn't UTF-8.
+std::string_view closeReason(std::string_view cause);
 
 // Messages from a viewer.
 
