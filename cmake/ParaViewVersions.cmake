@@ -9,6 +9,7 @@
 #                      from ParaView 6 on
 #   VDI_COLORS_BY_PARTS  whether views of pvbatch --symmetric can colour by an array that only some
 #                        ranks have; with ParaView 6.1, such a run aborts
+#   VDI_LOADS_STATES_ON_RANKS  whether pvbatch on several ranks can load a state; with ParaView 6.1, it hangs
 #   VDI_PLUGIN_UNITY   whether a unity build compiles the plugin's sources together
 
 # vdi_pass_over_python_modules(<folder of a ParaView's CMake files>): makes CMake accept Debian 13's
@@ -59,6 +60,7 @@ endif()
 set(VDI_NEEDS_DISPLAY ON)
 set(VDI_CONVERTS_ARRAYS OFF)
 set(VDI_COLORS_BY_PARTS ON)
+set(VDI_LOADS_STATES_ON_RANKS ON)
 set(VDI_PLUGIN_UNITY "${CMAKE_UNITY_BUILD}")
 if(ParaView_VERSION VERSION_GREATER_EQUAL 5.12)
   set(VDI_PLUGIN_UNITY OFF) # the header that it generates has no include guard
@@ -67,6 +69,7 @@ if(ParaView_VERSION VERSION_GREATER_EQUAL 6)
   set(VDI_NEEDS_DISPLAY OFF)
   set(VDI_CONVERTS_ARRAYS ON)
   set(VDI_COLORS_BY_PARTS OFF)
+  set(VDI_LOADS_STATES_ON_RANKS OFF)
 endif()
 set(VDI_GL_LOADER VTK::glew)
 if(TARGET VTK::glad)

@@ -6,7 +6,7 @@
  * VDI_TEST_FULL: the name of an output for which there is no room. VDI_TEST_FIRST: the first step's number.
  * VDI_TEST_WANTS: for each step whether it is wanted, such as 1010; others aren't handed over.
  * VDI_TEST_OWN_TIMES=1: each rank gives a step another time. VDI_TEST_PAUSE: milliseconds between steps.
- * VDI_TEST_LIMIT: the bytes beyond which no file can grow while the second step is executed. VDI_ISOLATION:
+ * VDI_TEST_LIMIT: the bytes beyond which no file can grow while the third step is executed. VDI_ISOLATION:
  * frames are made in processes of their own. */
 #include <math.h>
 #include <mpi.h>
@@ -148,7 +148,7 @@ int main(int argc, char** argv) {
       wrong += expect(rank, "wants", wanted[i] - '0', wants);
       if (wants == 0) continue;
     }
-    if (bytes != NULL && i == 1) {
+    if (bytes != NULL && i == 2) {
       const struct rlimit tight = {(rlim_t)atoi(bytes), limit.rlim_max};
       setrlimit(RLIMIT_FSIZE, &tight);
     }

@@ -208,13 +208,14 @@ def full():
 
 
 def limited():
-    """A step fails if a file, or the log alone, reaches the limit of file sizes. The next step works."""
-    run({"output": "v_{timestep}.vdi"}, 0, 3, 0, VDI_TEST_LIMIT="4096", said="File too large")
-    assert made() == ["v_0.vdi", "v_2.vdi"], made()
-    run({"output": "l_{timestep}.vdi", "max_share": 0.0001, "log": "run.jsonl"}, 0, 3, 0, VDI_TEST_LIMIT="1",
+    """A step fails if a file, or the log alone, reaches the limit of file sizes. The next step works. Two steps come before:
+    Mesa 26's lavapipe keeps its memory in files, and crashes if a step under the limit needs more."""
+    run({"output": "v_{timestep}.vdi"}, 0, 0, 3, 0, VDI_TEST_LIMIT="4096", said="File too large")
+    assert made() == ["v_0.vdi", "v_1.vdi", "v_3.vdi"], made()
+    run({"output": "l_{timestep}.vdi", "max_share": 0.0001, "log": "run.jsonl"}, 0, 0, 3, 0, VDI_TEST_LIMIT="1",
         said="can't write the log: File too large")
     assert [(event["event"], event.get("step")) for event in events()] == [
-        ("start", None), ("frame", 0), ("left_out", 2), ("end", None)], events()
+        ("start", None), ("frame", 0), ("left_out", 1), ("left_out", 3), ("end", None)], events()
 
 
 def lost_device():

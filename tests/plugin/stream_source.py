@@ -1,10 +1,12 @@
 """The source VDI Stream with `vdi serve` of a folder: it shows the same as an opened file, takes new VDIs, keeps one
-during Pause, returns to a restarted server, and keeps the token out of saved files and messages. On any number of ranks."""
+during Pause, returns to a restarted server, and keeps the token out of saved files and messages. On any number of ranks.
+With the argument `states`, it also loads a saved state."""
 
 import os
 import shutil
 import socket
 import subprocess
+import sys
 import tempfile
 import time
 
@@ -228,9 +230,12 @@ def saved_without_token(live, source):
     for name, text in texts.items():
         check(live.address in text, "the URL is in the " + name)
         check(TOKEN not in text, "the token isn't in the " + name)
+    return files["pvsm"]
 
+
+def loaded_without_token(live, state):
     simple.ResetSession()
-    simple.LoadState(files["pvsm"])
+    simple.LoadState(state)
     loaded, = simple.GetSources().values()
     text = standard_error(loaded.UpdatePipeline)
     check("there is no token" in information(loaded, "Connection") and text.count("there is no token") == 1,
@@ -260,7 +265,9 @@ paused_from_the_start(live)
 two(live, source)
 nothing_yet()
 wrong_token(live)
-source = saved_without_token(live, source)
+state = saved_without_token(live, source)
+if "states" in sys.argv:
+    source = loaded_without_token(live, state)
 deleted_while_connecting()
 simple.Delete(source)
 live.kill()
