@@ -21,7 +21,7 @@ ANSWER_SECONDS = 1.0
 def black_background(window):
     """Sets the black background that the tool's pictures have."""
     window.click("Load a color palette")
-    window.key(*["Down"] * 6, "Return")  # Black Background; the menu is not exposed to accessibility tools
+    window.key(*["Up"] * 3, "Return")  # Black Background; the menu is not exposed to accessibility tools
 
 
 def check_view(window, vdi, name):
