@@ -108,7 +108,7 @@ static void restore_environment(char** before) {
   }
   char** changes = before != NULL ? difference(before, environ) : NULL;
   char** back = before != NULL ? difference(environ, before) : NULL;
-  if (changes == NULL || back == NULL) complain("for want of memory, the environment");
+  if (changes == NULL || back == NULL) complain("for lack of memory, the environment");
   if (changes != NULL) {
     free_all(kept);
     kept = changes;

@@ -8,7 +8,7 @@ function bytesOfBase64(text) {
   try {
     binary = atob(text);
   } catch {
-    throw new FormatError("the data in this page are damaged: they are not base64");
+    throw new FormatError("this page's data are damaged: they aren't base64");
   }
   const bytes = new Uint8Array(binary.length);
   for (let i = 0; i < bytes.length; ++i) bytes[i] = binary.charCodeAt(i);
@@ -38,8 +38,8 @@ export async function unpack(text, size) {
       at += part.value.length;
     }
   } catch {
-    throw new FormatError("the data in this page are damaged: they don't unpack");
+    throw new FormatError("this page's data are damaged and can't be decompressed");
   }
-  if (at !== size) throw new FormatError("the data in this page are damaged: they end too early");
+  if (at !== size) throw new FormatError("this page's data are damaged: they end too early");
   return bytes;
 }

@@ -13,7 +13,7 @@ namespace vdi::catalyst {
 
 namespace {
 
-constexpr const char* uniformOnly = "; this implementation takes uniform grids alone";
+constexpr const char* uniformOnly = "; this implementation takes only uniform grids";
 constexpr std::array<const char*, 2> ghostFields{"ascent_ghosts", "vtkGhostType"};
 // vtkDataSetAttributes::DUPLICATECELL and HIDDENCELL. Cells that finer blocks cover (REFINEDCELL) aren't
 // shown anyway.

@@ -235,7 +235,7 @@ int IsolatedRun::settle(std::int64_t done, std::optional<At> at) {
   return std::max(worst, code);
 }
 
-/// Reports when parameters come into force. The process that makes frames has logged when viewers set them,
+/// Reports when parameters take effect. The process that makes frames has logged when viewers set them,
 /// but the simulation has gone on meanwhile.
 void IsolatedRun::tell(const Values& changes, const At& at) const {
   for (const auto& [name, value] : changes)
@@ -398,9 +398,9 @@ int IsolatedRun::leaveOut(std::int64_t step, double time) {
   return guarded(
       self_, VDI_CATALYST_SCRIPT,
       [&]() -> std::optional<std::string> {
-        if (isStopped) return "left out: somebody has stopped the process that makes frames";
+        if (isStopped) return "left out: the process that makes frames was stopped (SIGSTOP)";
         if (!isAnyStopped && process_->doneCount() == settled_)
-          return "left out: the process that makes frames has made none for long";
+          return "left out: the process that makes frames hasn't finished one for a long time";
         return "";
       },
       step);
@@ -418,7 +418,7 @@ bool IsolatedRun::hasNamedFields() const {
   return options_.run && has(options_.run->field) && (!options_.run->when || has(options_.run->when->field));
 }
 
-/// The fields to hand over: all, or those alone that a JSON run names.
+/// The fields to hand over: all, or only those that a JSON run names.
 StepFields IsolatedRun::fieldsOf(bool namedAlone) const {
   StepFields all;
   all.arrays = self_.fields.arrays();
@@ -454,9 +454,9 @@ int IsolatedRun::finish() {
     const bool isStopped = process_->isStopped();
     const bool isAnyStopped = isOfAny(isStopped);
     const int code = guarded(self_, VDI_CATALYST_ENGINE, [&]() -> std::optional<std::string> {
-      if (isStopped) return "somebody has stopped the process that makes frames; it is killed";
+      if (isStopped) return "the process that makes frames was stopped (SIGSTOP); killing it";
       if (isAnyStopped || process_->finished()) return "";
-      return "the process that makes frames doesn't end the run; it is killed";
+      return "the process that makes frames doesn't end the run; killing it";
     });
     end();
     return code;

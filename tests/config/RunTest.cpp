@@ -315,7 +315,7 @@ TEST_CASE("mistakes of several cameras are told with their place") {
   refusedField(R"("orbit": {"elevations": [91]})", "/orbit/elevations/0: must be from -90 to 90");
   refusedField(R"("orbit": {"elevations": [1], "elevation": 1})", "/orbit/elevations: can't be combined");
   refusedField(R"("orbit": {"count": 2, "turn": 5})", "/orbit/turn: can't be combined");
-  refusedField(R"("orbit": {"turn": 5}, "every_seconds": 5)", "an orbit's 'turn' goes with either");
+  refusedField(R"("orbit": {"turn": 5}, "every_seconds": 5)", "an orbit's 'turn' goes with only one of");
   refusedField(R"("output": "{timestep}_{camera}.vdi")", "/output: {camera} needs several viewpoints");
   refusedField(R"("orbit": {"count": 2}, "output": "{timestep}_{camera}{camera}.vdi")", "/output: only");
   refusedField(R"("orbit": {"count": 2}, "stream": true)", "several viewpoints need an 'output'");

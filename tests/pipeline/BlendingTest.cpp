@@ -232,7 +232,7 @@ TEST_CASE("blending: what can't be is refused by name") {
   for (const Blending& blending : modes(1.0)) {
     settings.blending = blending;
     CHECK_THROWS_WITH(generator.generate(camera, test::threeHues(1.0), settings),
-                      vdi::test::ContainsSubstring("composite blending alone"));
+                      vdi::test::ContainsSubstring("only composite blending"));
   }
   settings.blending = {};
   CHECK_NOTHROW(generator.generate(camera, test::threeHues(1.0), settings));

@@ -67,7 +67,7 @@ for mode in ("Maximum Intensity", "Minimum Intensity", "Isosurface"):
     image.BlendMode = mode
     with Messages("ErrorEvent", "WarningEvent") as said:
         image.UpdatePipeline()
-    about = [message for message in said if "composite blending alone" in message]
+    about = [message for message in said if "only composite blending" in message]
     check(len(about) == 1 and len(said) == 1 and "Picture Only" in about[0],
           "%s: a VDI refuses it in one message: %s" % (mode, " | ".join(said)))
 image.BlendMode = "Composite"

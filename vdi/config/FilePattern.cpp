@@ -48,7 +48,7 @@ FilePattern::FilePattern(const std::string& text) : text_(text) {
   const std::size_t camera = rest.find(cameraMark);
   if (camera != std::string::npos) rest.erase(camera, std::string(cameraMark).size());
   if (rest.find_first_of("{}") != std::string::npos)
-    throw std::invalid_argument("only {timestep} and {camera} may stand in braces, each once");
+    throw std::invalid_argument("only {timestep} and {camera} may appear in braces, once each");
   if (rest.find('\0') != std::string::npos || !path(0).has_filename())
     throw std::invalid_argument("isn't a file's name");
 }

@@ -204,7 +204,7 @@ void readCameras(const JsonValue& document, Run& run) {
   const bool turns = std::ranges::any_of(
       run.cameras, [](const RunCamera& camera) { return camera.orbit && camera.orbit->turn != 0.0; });
   const bool areCounted = !run.everySeconds && (run.every > 0) != run.everyTime.has_value();
-  if (turns && !areCounted) document.fail("an orbit's 'turn' goes with either 'every' or 'every_time' alone");
+  if (turns && !areCounted) document.fail("an orbit's 'turn' goes with only one of 'every' and 'every_time'");
 }
 
 int componentOf(const JsonValue& value) {

@@ -60,7 +60,7 @@ void validate(const Blending& blending) {
 void requireComposite(const Blending& blending) {
   if (blending.mode == BlendMode::Composite) return;
   throw Error(ErrorCode::InvalidArgument,
-              fmt::format("a VDI holds composite blending alone, and the blend mode is {}: choose composite, "
+              fmt::format("a VDI holds only composite blending, and the blend mode is {}: choose composite, "
                           "or a picture without a VDI",
                           toString(blending.mode)));
 }

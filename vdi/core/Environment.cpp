@@ -32,7 +32,7 @@ constexpr std::array variables{
         "The log of a run with Catalyst scripts: JSON lines in a .jsonl file, text in another", true},
     EnvironmentVariable{"VDI_PLUGIN", "a file",
                         "The plugin that Catalyst scripts load, instead of the installed one", true},
-    EnvironmentVariable{"VDI_RANKS_PER_HOST", "a whole number, at least 0; 0: the real number",
+    EnvironmentVariable{"VDI_RANKS_PER_HOST", "a whole number; 0 means the real number",
                         "The number of ranks assumed on each host", false},
     EnvironmentVariable{"VDI_TOKEN", "16 to 256 letters, digits, '-', '.', '_' and '~'",
                         "The secret that viewers of a VDI server need", true},

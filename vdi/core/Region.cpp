@@ -14,7 +14,7 @@ void validate(const Region& region) {
   if (region.box && (!isFinite(region.box->lo) || !isFinite(region.box->hi) || region.box->empty()))
     refuse("the cropping box must be finite and have a positive size along each axis");
   if (region.planes.size() > maxClipPlanes)
-    refuse(fmt::format("at most {} planes can clip a volume, there are {}", maxClipPlanes,
+    refuse(fmt::format("at most {} planes can clip a volume, but {} were given", maxClipPlanes,
                        region.planes.size()));
   for (const ClipPlane& plane : region.planes) {
     const double length = glm::length(plane.normal);

@@ -34,7 +34,7 @@ void validate(const Shading& shading) {
   if (!shading.on) return;
   const auto refuse = [](const std::string& what) { throw Error(ErrorCode::InvalidArgument, what); };
   if (shading.lights.size() > maxLights)
-    refuse(fmt::format("at most {} lights can shine on a volume, there are {}", maxLights,
+    refuse(fmt::format("at most {} lights can shine on a volume, but {} were given", maxLights,
                        shading.lights.size()));
   for (const Light& light : shading.lights) {
     if (!isFinite(light.direction)) refuse("a light's direction must be finite");

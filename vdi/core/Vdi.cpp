@@ -40,9 +40,8 @@ void validateList(std::span<const CompactSupersegment> list, std::uint64_t numbe
   std::uint32_t previousBack = 0;
   for (const CompactSupersegment& segment : list) {
     if (segment.front() < previousBack || segment.front() >= segment.back()) {
-      fail(
-          fmt::format("list {} has a supersegment from depth code {} to {}, but the one before it ends at {}",
-                      number, segment.front(), segment.back(), previousBack));
+      fail(fmt::format("list {} has a supersegment from depth code {} to {}, but the previous one ends at {}",
+                       number, segment.front(), segment.back(), previousBack));
     }
     previousBack = segment.back();
   }

@@ -34,9 +34,10 @@ Instance::Instance(bool validation) {
   }
   const VkResult result = vkCreateInstance(&info, nullptr, &handle_);
   if (validation && (result == VK_ERROR_LAYER_NOT_PRESENT || result == VK_ERROR_EXTENSION_NOT_PRESENT)) {
-    throw Error(ErrorCode::DeviceUnavailable,
-                fmt::format("validation was asked for, but isn't installed: {}", nameOf(result)),
-                validationLayer);
+    throw Error(
+        ErrorCode::DeviceUnavailable,
+        fmt::format("VDI_VALIDATION is set, but the validation layer isn't installed: {}", nameOf(result)),
+        validationLayer);
   }
   // The loader returns this on a machine without a driver.
   if (result == VK_ERROR_INCOMPATIBLE_DRIVER) {

@@ -102,7 +102,7 @@ Picture readPng(const std::filesystem::path& path) {
   // A byte of a PNG expands to at most 1032 bytes of rows (deflate).
   constexpr std::uint64_t maxPerByte = 1032;
   require(std::uint64_t{image->width} * image->height * bitsPerPixel(bytes) <= bytes.size() * maxPerByte * 8,
-          "its header says that it's larger than its bytes can hold");
+          "the header claims more pixels than the file can hold");
   require(image->width <= View::maxSide && image->height <= View::maxSide,
           fmt::format("it's more than {} pixels wide or high", View::maxSide));
   image->format = PNG_FORMAT_RGB;

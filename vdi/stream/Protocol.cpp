@@ -52,7 +52,7 @@ class Fields {
   Series series() const {
     const std::vector<JsonValue> times = object_.at("times").items();
     const std::vector<JsonValue> steps = object_.at("steps").items();
-    if (times.size() != steps.size()) refuse("\"times\" and \"steps\" aren't arrays of one length");
+    if (times.size() != steps.size()) refuse("\"times\" and \"steps\" must be arrays of equal length");
     Series series;
     for (const JsonValue& time : times)
       series.times.push_back(time.isNull() ? std::nullopt : std::optional(time.number()));

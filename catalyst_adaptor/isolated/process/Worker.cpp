@@ -44,7 +44,7 @@ std::uint64_t hashOf(std::span<const std::byte> bytes) {
   return std::hash<std::string_view>()({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
-/// What the other ranks' processes have to know of a rank's arrays.
+/// Packs the descriptions of a rank's arrays for the other ranks' processes.
 void pack(const std::vector<StepData::Array>& arrays, Packer& packer) {
   packer.put(std::uint64_t{arrays.size()});
   for (const StepData::Array& array : arrays) {
@@ -137,14 +137,14 @@ class Worker {
       for (const LeftOutSteps::Step& one : LeftOutSteps::unpack(unpacker).steps)
         vdi_catalyst_log_left_out(catalyst_, one.step, one.time);
     } catch (const std::exception& error) {
-      std::fprintf(stderr, "vdi_catalyst: the log lacks steps that were left out: %s\n", error.what());
+      std::fprintf(stderr, "vdi_catalyst: some skipped steps could not be logged: %s\n", error.what());
     }
   }
 
   /// The descriptor that came with a message. Throws std::runtime_error if it got lost.
   static Descriptor descriptorOf(Socket::Received& received) {
     if (received.descriptors.empty())
-      throw std::runtime_error("no memory came from the simulation: too many files are open");
+      throw std::runtime_error("couldn't receive the simulation's memory: too many open files");
     return std::move(received.descriptors.front());
   }
 

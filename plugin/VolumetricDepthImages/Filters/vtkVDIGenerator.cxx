@@ -189,7 +189,7 @@ vdi::Blending vtkVDIGenerator::CurrentBlending() const {
   if (blending.mode == vdi::BlendMode::Isosurface) blending.isovalues = this->IsosurfaceValues;
   if (blending.mode != vdi::BlendMode::Composite && !this->PictureOnly)
     throw vdi::Error(vdi::ErrorCode::InvalidArgument,
-                     "a VDI holds composite blending alone. Choose Composite as Blend Mode, or Picture Only "
+                     "a VDI holds only composite blending. Choose Composite as Blend Mode, or Picture Only "
                      "(PictureOnly) for a picture of this mode without a VDI");
   return blending;
 }
@@ -353,7 +353,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   output->Initialize();
   pv::Regeneration& regeneration = this->Internal->Regeneration;
   const pv::Origin origin = this->OriginOf(input);
-  // On several ranks, a writer asks for another piece of the output that is there already.
+  // On several ranks, a writer asks for another piece of the output that has been made already.
   const bool isMade = regeneration.isMade(origin, this->CurrentMTime()) &&
                       (regeneration.made()->GetNumberOfPoints() > 0 || !this->IsRoot());
   const pv::Regeneration::Last last = regeneration.begin(this->CurrentMTime());
@@ -486,7 +486,7 @@ bool vtkVDIGenerator::Defer(vtkDataObject* input, const pv::Origin& origin, bool
     return false;
   }
   if (!this->Ask(input, origin)) return false;
-  // Rank 0 alone gives a picture. If it has no memory for that, all ranks make the VDI in place.
+  // Only rank 0 gives a picture. If it has no memory for that, all ranks make the VDI in place.
   bool isGiven = true;
   try {
     this->GiveEarlier(output);
@@ -819,7 +819,7 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, const pv::Origin& origin, v
   } else {
     vdi = generator.generate(camera, function, settings, progress);
   }
-  // One rank alone has the result. If it can't pass that on, all ranks fail.
+  // Only one rank has the result. If it can't pass that on, all ranks fail.
   generator.communicator().together([&, &from = camera] {
     internal.TakeReports(generator);
     this->TakeReport();
