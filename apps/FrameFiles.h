@@ -44,7 +44,7 @@ class FrameFiles {
   void start(stream::Server& server);
   /// Stops passing frames to the server. The server may still call show, and may end afterwards.
   void stop();
-  /// For ServerOptions::show.
+  /// Implements ServerOptions::show.
   void show(std::uint32_t index);
 
  private:

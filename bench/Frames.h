@@ -33,7 +33,7 @@ struct StageTimes {
   std::optional<RankTimes> device;  // without transfers; nullopt: not reported
 };
 
-/// In the order of a frame.
+/// The stages, in the order of a frame.
 enum class FrameStage : std::size_t { Generate, Distribute, Composite, Gather };
 inline constexpr std::size_t frameStages = 4;
 

@@ -135,7 +135,7 @@ class Log {
   std::size_t full_ = 0;
 };
 
-/// A viewer that decodes and draws each level, on a thread of its own.
+/// A viewer that decodes and draws each level on its own thread.
 class Viewer {
  public:
   Viewer(const std::string& link, std::shared_ptr<gpu::Device> device, double degrees, const glm::ivec2& size,
@@ -527,7 +527,7 @@ class StreamSuite {
   Reconstruction reconstruction_;
   VdiGenerator generator_;
   TransferFunction function_;    // for the current data set
-  std::vector<Camera> cameras_;  // likewise
+  std::vector<Camera> cameras_;  // for the current data set
   std::FILE* table_;
   std::vector<json> rows_;
 };

@@ -60,7 +60,7 @@ const std::vector<std::string>& suiteNames();
 inline constexpr const char* ranksSuite = "ranks";
 /// The suite of viewpoints around the scene. It has no data sets of its own.
 inline constexpr const char* viewpointsSuite = "viewpoints";
-/// The suite of frames on their way to a viewer. It has no data sets of its own.
+/// The suite that sends frames to a viewer. It has no data sets of its own.
 inline constexpr const char* streamSuite = "stream";
 
 /// Completes the options with the suite's values, or with the defaults without a suite.

@@ -11,8 +11,8 @@ namespace vdi::catalyst {
 
 struct NoLock {};
 
-/// `usable` tells whether a handle lives, `parametersOf` gives a living one's parameters, and each change of
-/// fields holds a `Lock`. `Handle` is the engine's vdi_catalyst, a FieldCalls.
+/// `usable` tells whether a handle is valid, `parametersOf` gives a valid handle's parameters, and each
+/// change of fields holds a `Lock`. `Handle` is the engine's vdi_catalyst, a FieldCalls.
 template <typename Handle, bool (*usable)(const Handle*), Parameters& (*parametersOf)(Handle&),
           typename Lock = NoLock>
 struct FieldEntries {

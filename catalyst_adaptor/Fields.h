@@ -43,7 +43,7 @@ class Fields {
   static Change arrayChange(const std::string& name, bool cells, int type, std::vector<StridedValues> values);
   /// Shifts the values of that array by `offset` cells from the points or the centres of cells.
   static Change offsetChange(const std::string& name, bool cells, const std::array<double, 3>& offset);
-  /// The particles of which an array of cells is to be made. It replaces such an array of that name.
+  /// Particles to deposit into a cell array, which replaces a cell array of that name.
   static Change particlesChange(const std::string& name, const ParticleArray& particles);
   void set(Change change) noexcept;
   /// The particles of that name; null if there are none. All ranks have particles of the same names.
@@ -56,7 +56,7 @@ class Fields {
 
   /// Whether this rank has the array, which some of its blocks may lack.
   bool has(const std::string& name, bool cells) const;
-  /// Whether the array of that name is one of cells; nullopt if this rank has no such array. Throws
+  /// Whether the array of that name holds cell data; nullopt if this rank has no such array. Throws
   /// std::runtime_error if arrays of both kinds have the name.
   std::optional<bool> associationOf(const std::string& name) const;
   /// The names of all arrays, for messages: "cells 'V', points 'p'".
@@ -124,7 +124,7 @@ class Fields::Change {
 /// The bytes of a scalar. Throws std::invalid_argument for a type that vdi_catalyst.h doesn't have.
 std::size_t bytesOf(int type);
 
-/// Collective: whether the array of that name is one of cells, unless `given` tells. A rank that lacks the
+/// Collective: whether the array of that name holds cell data, unless `given` says so. A rank that lacks the
 /// array counts as one whose blocks lack it. Throws on all ranks as Fields::associationOf does, and if no
 /// rank has the array, all blocks lack it, or ranks have arrays of different kinds.
 bool agreeOnCells(const comm::Communicator& comm, const Fields& fields, const std::string& name,

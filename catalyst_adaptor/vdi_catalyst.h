@@ -175,7 +175,7 @@ typedef struct vdi_catalyst_strides {
 /* As vdi_catalyst_set_array, for values in another layout: interleaved with others, padded, z fastest, or
  * parts of a larger allocation. strides[i] and data[i] belong to block i. With `components` > 1, from 1 to
  * 16, the array is one of vectors, of which a run shows the magnitude, a component, or the phase of two
- * components, the real and the imaginary part. For one component alone, pass its first value's address and
+ * components, the real and the imaginary part. For only one component, pass its first value's address and
  * components = 1.
  *
  * Values are read where they are, in any layout: a run without scripts never copies them on the host, nor

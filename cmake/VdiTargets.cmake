@@ -12,7 +12,7 @@ function(vdi_target_options target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow ${VDI_UNITY_OPTIONS})
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}>")
   if(VDI_SANITIZE)
-    # AddressSanitizer finds null pointers and ends of objects, too. Checking these twice takes long to compile.
+    # AddressSanitizer finds null pointers and ends of objects, too. Checking them twice slows the compiler down.
     target_compile_options(${target} PUBLIC -fsanitize=${VDI_SANITIZE} -fno-sanitize=null,object-size -fno-omit-frame-pointer)
     target_link_options(${target} PUBLIC -fsanitize=${VDI_SANITIZE})
   endif()

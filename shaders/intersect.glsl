@@ -54,7 +54,7 @@ struct Part {
   float low;  // depths
   float high;
   float slant;  // length of the ray relative to the list's own, between two depths
-  // Its ends in V_O's picture, relative to the list's centre; for Reconstruction::Sheared.
+  // The part's ends in V_O's picture, relative to the list's centre; only for Reconstruction::Sheared.
   vec2 begin;
   vec2 end;
 };

@@ -1,6 +1,6 @@
 // Pre-segments: neighbouring intervals that deviate little from the first of them. Twin of
-// preSegmentsOf in vdi/reference/SegmentByMerging.cpp. reduce.comp merges pre-segments into
-// supersegments.
+// preSegmentsOf in vdi/reference/SegmentByMerging.cpp. Steps 1 and 3 of docs/architecture.md use them;
+// reduce.comp merges pre-segments into supersegments (step 4).
 //
 // A program begins a ListState, adds the list's intervals to it, front to back, and ends it: with
 // beginCounting and endCounting, or with beginWriting and endWriting.

@@ -187,7 +187,7 @@ float endOf(uint k) { return mix(middleOf(k), beginOf(k + 1u), params.slabs != 0
 // Uses a ray's intervals one by one; within a brick they leave no gaps.
 void useSample(float front, float back, Sample it);
 
-// Number of texels, and then of slabs, requested at a time: a GPU waits for one as long as for all. It must
+// Number of texels, and then of slabs, requested at a time: a GPU waits as long for one as for all. It must
 // be 1 if samplesAtOnce is not.
 layout(constant_id = 3) const uint samplesAhead = 1;
 
@@ -209,7 +209,8 @@ void projectSamples(Brick brick, uint begin, uint end) {
     float positions[samplesAhead];
     [[unroll]] for (uint i = 0u; i < samplesAhead; ++i)
       positions[i] = tablePosition(brick, endOf(min(batch + i, end - 1u)));
-    [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) project(positions[i], endOf(min(batch + i, end - 1u)));
+    [[unroll]] for (uint i = 0u; i < samplesAhead; ++i)
+      project(positions[i], endOf(min(batch + i, end - 1u)));
   }
 }
 

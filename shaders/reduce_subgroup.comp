@@ -33,7 +33,7 @@ void store(uint i, StoredPreSegment preSegment, vec4 appearance) {
   appearances[i] = appearance;
 }
 
-// Loads the list from device memory; returns how many pre-segments must not merge with the one before.
+// Loads the list from device memory; returns how many pre-segments must not merge with the previous one.
 // `ahead` is the invocation's first one.
 uint loadList(PreSegmentArray preSegments, uint count, StoredPreSegment ahead) {
   uint cuts = 0u;

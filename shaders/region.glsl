@@ -6,7 +6,7 @@
 #include "shared/cast.h"
 
 // The part of [enter, leave], in depths from the lattice's front, on the visible sides of the planes. Depends
-// on the ray and the planes alone, so it is the same on every rank.
+// only on the ray and the planes, so it is the same on every rank.
 vec2 clipped(vec2 part) {
   for (uint i = 0u; i < params.clipPlaneCount; ++i) {
     vec4 plane = params.clipPlanes[i];

@@ -16,9 +16,9 @@ layout(local_size_x_id = 2) in;
 layout(push_constant, scalar) uniform Push { RenderRays rays; };
 layout(set = 0, binding = 1, scalar) uniform Params { RenderParams params; };
 
-// Reconstruction::Smooth and Sheared, or Constant.
+// Whether the reconstruction is Smooth or Sheared, and not Constant.
 layout(constant_id = 0) const bool smoothReconstruction = true;
-// Reconstruction::Sheared.
+// Whether the reconstruction is Sheared.
 layout(constant_id = 6) const bool shearedReconstruction = false;
 // Adjacent invocations that share a ray: 1, or 2, of which each handles one of the two lists of a column. Few
 // rays meet material, and a GPU waits for the longest of them.

@@ -1,4 +1,4 @@
-// Catch2's own code, which takes long to compile.
+// Catch2's own code, which takes a long time to compile.
 #define CATCH_CONFIG_RUNNER
 #include "tests/Catch.h"
 #include "tests/Devices.h"

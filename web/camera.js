@@ -237,7 +237,7 @@ const MOST_DIGITS = 17;   // those of double precision
 
 /**
  * A camera as text for a URL. Numbers have the digits of single precision, and places more where
- * the coordinates are large beside what the camera sees.
+ * the coordinates are large compared with the part that the camera sees.
  * @param {Camera} camera
  */
 export function cameraText(camera) {

@@ -280,7 +280,7 @@ function unfold(folded) {
 
 /**
  * Walks the lists of a chunk and calls `restore(index, reference, previous)` for each supersegment.
- * `reference` is the supersegment that predicts it, `previous` the one before it in its list; -1
+ * `reference` is the supersegment that predicts it, `previous` the preceding one in its list; -1
  * means none.
  * @param {Chunk} chunk
  * @param {Uint8Array} plain

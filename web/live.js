@@ -23,7 +23,7 @@ import {LevelAssembler, STREAM_VERSION, StreamError, extendedSeries, serverMessa
  */
 
 /**
- * A level on its way to the screen. `done` acknowledges its end, unless that has been done.
+ * A level that will be shown. `done` acknowledges its end, unless that has been done.
  * @typedef {{level: Arrived, load: () => Promise<PreparedVdi>, done?: () => void}} Pending
  */
 
@@ -410,7 +410,7 @@ export class Live {
   }
 
   /**
-   * Puts a level aside for the end of the pause, unless a newer one is there already.
+   * Puts a level aside for the end of the pause, unless a newer one waits already.
    * @param {Arrived} level
    * @param {() => Promise<PreparedVdi>} load
    * @returns {boolean} whether the pause keeps the level off the screen

@@ -34,7 +34,7 @@ class FrameProcess {
   FrameProcess(const FrameProcess&) = delete;
   FrameProcess& operator=(const FrameProcess&) = delete;
 
-  /// Takes the process's messages. Waits for the first message no longer than `patience`.
+  /// Takes the process's messages. Waits at most `patience` for the first message.
   void listen(Milliseconds patience) noexcept;
 
   bool hasCome() const { return socket_.isOpen(); }
@@ -45,7 +45,7 @@ class FrameProcess {
   /// Describes how the process ended and what it was doing: "was killed by signal 9 (Killed) while it
   /// started".
   std::string end() const;
-  /// Whether somebody has stopped the process, as by SIGSTOP.
+  /// Whether the process is stopped, as by SIGSTOP.
   bool isStopped() const;
 
   /// Number of finished steps among those handed over.

@@ -31,7 +31,7 @@ using vdi::catalyst::guarded;
 using vdi::catalyst::IsolatedOptions;
 using vdi::catalyst::require;
 
-/// The living handles, of a run of scripts and of a JSON run. Any other handle has been finalized, and must
+/// The live handle of a run of scripts or of a JSON run. Any other handle has been finalized, and must
 /// not be read.
 vdi_catalyst*& alive(bool isJson) {
   static std::array<vdi_catalyst*, 2> handles{};

@@ -29,7 +29,7 @@ class Job {
   Job(const Job&) = delete;
   Job& operator=(const Job&) = delete;
 
-  /// Whether all its processes on this host have ended. Waits for that no longer than `patience`.
+  /// Whether all its processes on this host have ended. Waits at most `patience`.
   bool isOver(std::chrono::milliseconds patience) const;
   /// The first lines of the launcher's output, in one line.
   std::string said() const;

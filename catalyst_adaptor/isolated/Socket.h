@@ -39,7 +39,7 @@ class Socket {
     std::vector<std::byte> message;
     std::vector<Descriptor> descriptors;
   };
-  /// The next message. Waits for it no longer than `patience`; a negative one waits for ever.
+  /// The next message. Waits at most `patience`; a negative one waits for ever.
   Received receive(std::chrono::milliseconds patience) const;
 
   static constexpr std::size_t longest = 65536;

@@ -29,7 +29,7 @@ using vdi::catalyst::guardedTogether;
 using vdi::catalyst::require;
 using vdi::catalyst::requireEqual;
 
-/// The living handle. Any other handle has been finalized, and must not be read.
+/// The live handle. Any other handle has been finalized, and must not be read.
 vdi_catalyst*& alive() {
   static vdi_catalyst* handle = nullptr;
   return handle;

@@ -31,7 +31,7 @@ struct LiveStream::Service {
   stream::Server server;
   stream::Publisher publisher;
   std::unique_ptr<stream::SecretFile> link;
-  std::string told;  // the last reported trouble of the publisher
+  std::string told;  // the publisher's problem reported last
 };
 
 LiveStream::LiveStream(const config::RunStream& options) {

@@ -321,7 +321,7 @@ void RunEngine::execute(Fields& fields, Parameters& parameters, std::int64_t ste
   if (state.steering) state.steering->requireLogged();
 }
 
-/// Makes the frames of all cameras, or of the first one alone if they are for the stream only.
+/// Makes the frames of all cameras, or only those of the first camera if they are for the stream.
 void RunEngine::makeAll(Fields& fields, std::int64_t step, double time, double waited, bool isForFiles) {
   State& state = *state_;
   const auto begin = Clock::now();

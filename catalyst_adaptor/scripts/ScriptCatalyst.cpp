@@ -46,8 +46,7 @@ using vdi::catalyst::ScriptLog;
 using vdi::catalyst::scriptsOf;
 using Clock = std::chrono::steady_clock;
 
-/// The living handle, of which a process has one at a time. Any other handle has been finalized, and must not
-/// be read.
+/// The live handle; a process has one at a time. Any other handle has been finalized, and must not be read.
 vdi_catalyst*& alive() {
   static vdi_catalyst* handle = nullptr;
   return handle;
@@ -156,7 +155,7 @@ int depositIfWanted(vdi_catalyst& self, std::int64_t step, double time) {
       step);
 }
 
-/// `given`: the files alone, or with arguments.
+/// `given`: the files, with or without arguments.
 template <typename Given>
 int initializeAny(int32_t fortran_communicator, int32_t script_count, const Given* given, Place place,
                   vdi_catalyst** catalyst) {

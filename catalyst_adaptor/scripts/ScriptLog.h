@@ -37,7 +37,7 @@ class ScriptLog {
     double time = 0.0;
     std::chrono::steady_clock::time_point begin;
   };
-  /// For the milliseconds that each rank has waited for the last one to begin a step: [ranks].
+  /// Receives each rank's wait for the slowest rank to begin the step, in ms: [ranks].
   std::span<double> waits() { return waits_; }
   /// Appends a line for each frame and, unless `error` is empty, one for the step's failure. The frames share
   /// the time since the step's beginning: each ends where the next one begins. Throws Error{Io}.

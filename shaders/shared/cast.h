@@ -52,7 +52,7 @@ struct CastParams {
   VDI_ADDRESS(Vec4Array) colors;             // [h][w], premultiplied
   VDI_ADDRESS(FloatArray) depths;            // [h][w]
   VDI_ADDRESS(UintPairArray) extremes;       // [h][w]: instead of colors and depths (blending.glsl)
-  VDI_ADDRESS(CellRangeArray) ranges;        // ranges of macrocells (cells.h); for blend modes other than composite
+  VDI_ADDRESS(CellRangeArray) ranges;        // macrocells' ranges (cells.h); unless blending is composite
   VDI_ADDRESS(UintArray) status;             // [statusWords]
   VDI_ADDRESS(UintArray) histogram;          // [histogramLevels + 1][2]
   VDI_ADDRESS(UintArray) levels;             // [rows][countedWidth][countedLevelWords]

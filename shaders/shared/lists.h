@@ -35,7 +35,7 @@ struct StoredPreSegment {
   float before;  // transmittance in front of it
   float unused;
   // Premultiplied colour and optical depth of the whole pre-segment. The optical depth is negative if the
-  // pre-segment must not merge with the one before.
+  // pre-segment must not merge with the previous one.
   vec4 light;
 };
 

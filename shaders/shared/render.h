@@ -35,7 +35,7 @@ VDI_CONST float renderSlopes = 127.0F;  // steps from 0 to renderMaxSlope
 VDI_CONST int renderNoSlope = -128;     // during the search for slopes
 VDI_CONST int renderOnFace = -128;      // in both slopes of a front or a back: it lies on a face of the box
 VDI_CONST uint renderFaces = 6;         // number of a box's faces
-VDI_CONST float renderMostDepth = 6.0F;      // optical depth of a supersegment, behind which hardly anything shows
+VDI_CONST float renderMostDepth = 6.0F;      // optical depth that hides nearly all behind it
 // Margin of comparisons, so that values that are equal but for rounding give the same decision everywhere.
 VDI_CONST float renderTie = 1.0F / 64.0F;
 VDI_CONST float renderLeastOpacity = 0.05F;  // over a footprint
@@ -123,7 +123,7 @@ struct ExpandConstants {
   VDI_ADDRESS(UintArray) offsets;            // [lists + 1]
   VDI_ADDRESS(SegmentArray) from;            // compact array, as stored; a part of the supersegments
   VDI_ADDRESS(RenderSegmentArray) segments;  // all; expandModeSegments: those made from `from`
-  // [supersegments], four bytes each (render_segment.glsl); for Reconstruction::Sheared alone
+  // [supersegments], four bytes each (render_segment.glsl); only for Reconstruction::Sheared
   VDI_ADDRESS(UintArray) slopes;
   VDI_ADDRESS(ListHeads) heads;              // [lists]
   VDI_ADDRESS(MaskArray) tileDepthMasks;     // [tiles.y][tiles.x], then [largeTiles.y][largeTiles.x]

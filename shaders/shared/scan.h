@@ -8,7 +8,7 @@ VDI_SHARED_BEGIN
 VDI_CONST uint scanGroup = 256;
 VDI_CONST uint scanPerThread = 8;
 VDI_CONST uint scanModeSum = 0;  // values -> prefix within each group's part, sums[group] = the part's total
-VDI_CONST uint scanModeAdd = 1;  // prefix += sums of the groups before
+VDI_CONST uint scanModeAdd = 1;  // prefix += sums of the preceding groups
 VDI_CONST uint scanModeRebase = 2;  // prefix += base
 
 struct ScanConstants {

@@ -122,7 +122,7 @@ TEST_CASE("components, magnitudes and values out of order are measured where the
   const comm::Communicator comm = world();
   const Slab slab(comm, 0, 0);
   const int layers = slab.hi - slab.lo;
-  // [x][y][z][3], z fastest, beside a fourth number that isn't a component.
+  // [x][y][z][3], z fastest, with a fourth number that isn't a component.
   std::vector<float> values;
   for (int x = 0; x < side; ++x) {
     for (int y = 0; y < side; ++y) {
@@ -181,7 +181,7 @@ TEST_CASE("what finer blocks cover doesn't count") {
   CHECK(*measured(Kind::Mean, comm, fields) == Approx(2.0 * 7.0 / 8.0 + 10.0 / 8.0));
 }
 
-TEST_CASE("NaN doesn't count, and infinite values count for the extremes alone") {
+TEST_CASE("NaN doesn't count, and infinite values count only for the extremes") {
   const comm::Communicator comm = world();
   const Slab slab(comm, 0, 0);
   constexpr double infinite = std::numeric_limits<double>::infinity();

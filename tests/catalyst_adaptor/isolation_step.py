@@ -24,7 +24,7 @@ TEXT = ('{"field": "T", "every": %d, "resolution": [640, 480], "colors": {"range
 
 
 def run(what, steps, **environment):
-    """The (microseconds, whether the watched frame isn't there yet) of each step."""
+    """The (microseconds, whether the watched frame doesn't exist yet) of each step."""
     command = [program, what, str(steps)]
     if OWN:
         command = ["taskset", "-c", str(CORES[0]), *command]

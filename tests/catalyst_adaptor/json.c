@@ -55,7 +55,7 @@ static int refuse(int rank, const char* json, int wanted) {
   return wrong + expect(rank, "the handle of a failed initialize_json", 1, catalyst == NULL);
 }
 
-/* Files come and go on rank 0, which alone reads them. */
+/* Files come and go on rank 0, the only one that reads them. */
 static int refuse_bad(int rank) {
   static char deep[6 * DEPTH + 1];
   for (int i = 0; i < DEPTH; ++i) strcpy(deep + i * 5, "{\"a\":");

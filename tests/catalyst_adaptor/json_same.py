@@ -10,7 +10,7 @@ RANGE = [0.2, 1.0]
 grid = TrivialProducer(registrationName="grid")
 image = VolumetricDepthImage(Input=grid)
 image.SelectInputScalars = ["CELLS", os.environ.get("VDI_TEST_FIELD", "V")]
-# ParaView 5.13 imports presets on one rank alone, so their points come from the file.
+# ParaView 5.13 imports presets on only one rank, so their points come from the file.
 with open(os.path.join(os.path.dirname(os.path.abspath(__file__)), "json_preset.json")) as file:
     preset = next(one for one in json.load(file) if one["Name"] == "blue to red")
 colors = GetColorTransferFunction("V")

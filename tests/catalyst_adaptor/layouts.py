@@ -57,7 +57,7 @@ def same():
     assert alone("complex") != angle
     wide = {"range": [-1.5e12, 1.5e12], "opacities": [[-1.5e12, 0.0], [0.3e12, 0.05], [1.5e12, 0.8]]}
     assert alone("integers", colors=wide) == alone("integers_as_f64", colors=wide)
-    # The same function, sampled half a cell beside. With an offset of the wrong sign or axis it would lie a cell away.
+    # The same function, sampled half a cell away. With an offset of the wrong sign or axis it would lie a cell away.
     beside = differences(expected[0], alone("staggered")[0]).mean()
     assert 0 < beside < 0.6, beside
     # A rank without an array of the name counts as one whose block lacks it.
@@ -69,7 +69,7 @@ def same():
 
 
 def ranks():
-    """Values beside the middles of cells, where the corners of eight blocks meet: several ranks make the picture of one."""
+    """Values off the middles of cells, where the corners of eight blocks meet: several ranks make the picture of one."""
     for field in ("packed", "z_fastest", "staggered", "staggered_thrice"):
         most = difference(run(field, 32, launcher=ALONE)[0][0], run(field, 32)[0][0])
         print("%s: ranks differ by at most %d/255" % (field, most))

@@ -3,7 +3,7 @@
  * none. Arguments: a JSON text or file (or a script, which ends in .py), then the code that each step must
  * return. The array's name is V. Exit status 0 if all calls return what they should. VDI_TEST_FAULTS=1: there
  * are also particles that can't be deposited. VDI_TEST_LENGTHS=1: half of the particles have smoothing
- * lengths of two cells, and the array's values lie beside the middles of cells. */
+ * lengths of two cells, and the array's values lie off the middles of cells. */
 #include <math.h>
 #include <mpi.h>
 #include <stdlib.h>

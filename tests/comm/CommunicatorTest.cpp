@@ -162,7 +162,7 @@ TEST_CASE("broadcast takes size and bytes from the root, whoever it is") {
   }
 }
 
-TEST_CASE("broadcastText calls its work on the root alone") {
+TEST_CASE("broadcastText calls its work only on the root") {
   const Communicator world = Communicator::world();
   for (int root = 0; root < world.size(); ++root) {
     const auto text = [&] {

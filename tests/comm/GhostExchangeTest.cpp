@@ -149,7 +149,7 @@ Block withUnsetHalo(const Block& block, bool cells) {
   return wide;
 }
 
-TEST_CASE("values beside points and cells' middles come from the blocks that own them") {
+TEST_CASE("values off points and cells' middles come from the blocks that own them") {
   const Communicator world = Communicator::world();
   const auto offset =
       GENERATE(glm::dvec3(-0.5, 0.0, 0.0), glm::dvec3(0.0, 0.5, 0.0), glm::dvec3(-0.5, -0.5, 0.0),

@@ -62,7 +62,7 @@ TEST_CASE("memory to be shared has a name only from publish to unlink") {
   CHECK(!HostMemory::anonymous(1000)->publish());
 }
 
-TEST_CASE("the next process removes names that a killed one has left, and those alone") {
+TEST_CASE("the next process removes only names that a killed one has left") {
   const auto nameThatStays = [] {
     auto* kept =
         new std::shared_ptr(HostMemory::shared(1000));  // never deleted, as in a process that is killed

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds the programs of tests/install/project with the compilers alone and pkg-config's flags, and runs two of them in
+# Builds the programs of tests/install/project with only the compilers and pkg-config's flags, and runs two of them in
 # a folder of their own. Arguments: the pkgconfig folder, the script, the output folder.
 set -euo pipefail
 project=$(dirname "$(realpath "$0")")/project

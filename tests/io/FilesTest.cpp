@@ -225,7 +225,7 @@ TEST_CASE("a failed write gives Error{Io}, and leaves only the old file") {
   CHECK(folder.fileCount() == 2);
 }
 
-TEST_CASE("readers beside several writers of one path always see a whole file") {
+TEST_CASE("readers always see a whole file while several writers replace it") {
   const test::TemporaryFolder folder;
   const fs::path path = folder.path() / "f";
   constexpr std::size_t size = 50000;

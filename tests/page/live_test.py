@@ -72,7 +72,7 @@ def test_frames(browser):
         check(camera_of(browser)["position"] == turned["position"], "a new frame leaves the view as it is")
         compare("live, turned", shown(browser, "live_turned"), rendered("run/step_1.vdi", turned))
 
-        # A frame that comes while the GPU's context is lost is shown when that is back.
+        # A frame that arrives while the GPU's context is lost is shown once it is restored.
         browser.value("window.context = vdiPage.viewer.renderer.gl.getExtension('WEBGL_lose_context'); context.loseContext()")
         browser.wait("vdiPage.viewer.isLost", SECONDS)
         check("lost" in message_of(browser), "a lost context is reported")

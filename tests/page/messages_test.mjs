@@ -329,9 +329,9 @@ async function testSeries() {
   sockets[0].open();
   sockets[0].text(welcome);
   const wishes = () => sockets[0].sent.filter((m) => m.type !== "hello" && m.type !== "ack").map((m) => m.type + (m.index ?? "")).join();
-  check(wishes() === "", "a frame that isn't there yet isn't asked for");
+  check(wishes() === "", "a frame that doesn't exist yet isn't asked for");
   sockets[0].text({type: "series", from: 3, times: [1], steps: [3]});
-  check(wishes() === "show3", "a frame is asked for once it is there");
+  check(wishes() === "show3", "a frame is asked for once it exists");
   sendLevel(sockets[0], 3, 1, 1);
   await settled(live);
   live.pause();

@@ -317,7 +317,7 @@ def check_quick_clicks(browser):
       return {plays, frames: asked.map(([frame]) => frame), times: asked.map(([, time]) => time)};
     })()""")
     check(played["plays"], f"a series plays on after Play, Pause and Play: {played}")
-    check(all(step % 3 == 1 for step in np.diff(played["frames"])), f"each frame follows the one before: {played}")
+    check(all(step % 3 == 1 for step in np.diff(played["frames"])), f"each frame follows the previous one: {played}")
     # A loop waits a tenth of a second between frames; two loops would take turns.
     check(min(np.diff(played["times"]), default=0) > 90, f"one loop plays: {played}")
     check(not browser.value("vdiPage.isPlaying"), "the button stops a series")

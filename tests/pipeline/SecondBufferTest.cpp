@@ -78,7 +78,7 @@ TEST_CASE("a VDI that is shown from the device's lists is the one that goes by w
   }
 }
 
-TEST_CASE("a VDI that is prepared beside renders changes none of them until it is shown") {
+TEST_CASE("a VDI that is prepared during renders changes none of them until it is shown") {
   const Camera camera = test::oblique();
   const Camera turned = camera.azimuth(15.0);
   std::vector<Vdi> vdis;

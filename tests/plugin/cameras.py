@@ -112,7 +112,7 @@ for camera in range(3):
     start = time.perf_counter()
     check(same(lists(images[-1]), expected[camera]), "filter %d of one input makes the VDI of a filter alone" % camera)
     seconds.append(time.perf_counter() - start)
-    check(uploads(images[-1]) == (camera == 0), "the first filter alone uploads values, not number %d" % camera)
+    check(uploads(images[-1]) == (camera == 0), "only the first filter uploads values, not number %d" % camera)
     memory.append(report(images[-1])[1])
 print("first frames: %s s; device memory: %s MiB"
       % (" ".join("%.2f" % s for s in seconds), " ".join("%.1f" % m.max() for m in memory)))
@@ -155,7 +155,7 @@ third.Supersegments = 25
 for camera, image in enumerate(images):
     check(same(lists(image, 0.0), expected[camera]), "all filters go back to the first step, filter %d" % camera)
 
-# In the background.
+# The same in the background.
 for image in images:
     command(image, "Hold")
     image.Supersegments = 8

@@ -1,4 +1,4 @@
-"""The filters' defaults, and their messages when a script asks for what isn't there."""
+"""The filters' defaults, and their messages when a script asks for something that doesn't exist."""
 
 import os
 import re
@@ -154,7 +154,7 @@ preset = simple.GetColorTransferFunction("preset")
 preset.ApplyPreset("Cool to Warm", True)
 simple.GetOpacityTransferFunction("preset").Points = [0, 0, 0.5, 0, 2, 1, 0.5, 0]
 filter_of(producer_of(renamed(field([0, 0, 0]), "preset")), name="preset").UpdatePipeline()
-check(range_of("preset") == [0, 4, 0, 2], "a preset waits for the range, opacities set beside it don't move")
+check(range_of("preset") == [0, 4, 0, 2], "a preset waits for the range, opacities set with it don't move")
 check(not errors_of(filter_of(source, "POINTS", "velocity", Component=0)), "a component is rendered")
 check(range_of("velocity") == [-1, 3, -1, 3], "the map of a component has the component's range, not the magnitude's")
 

@@ -108,7 +108,7 @@ updates = []
 view.SMProxy.AddObserver("UpdateDataEvent", lambda *_: updates.append(asked(image, "Outdated")))
 view.ViewTime = 1.0
 simple.Render(view)
-check(updates == [1] and same(codes(image), first), "a view shows the step before, and its update tells of that")
+check(updates == [1] and same(codes(image), first), "a view shows the previous step, and its update says so")
 check(prepare(image) == 100, "the step is prepared")
 release_and_render(image, view)
 second = codes(image)

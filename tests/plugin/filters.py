@@ -222,7 +222,7 @@ check(times_of(opened) == TIMES, "a file that goes leaves its time")
 later = simple.VDIReader(FileNames=names)
 check(times_of(later) == [2, 3.5, 5, 7], "a file that was never there gets a time between the others', %s" % times_of(later))
 for what, proxy, missing in (("that goes", opened, 4.5), ("that was never there", later, 3.5)):
-    check(np.array_equal(shown_at(proxy, 5.0), pictures[2]), "the other files are shown beside one " + what)
+    check(np.array_equal(shown_at(proxy, 5.0), pictures[2]), "the other files are shown in spite of one " + what)
     said = errors_of(lambda: proxy.UpdatePipeline(missing))
     check(len(said) == 1, "a file %s is one error, %d" % (what, len(said)))
     check(shown_at(proxy, missing) is None and np.array_equal(shown_at(proxy, 7.0), pictures[3]),
@@ -230,8 +230,8 @@ for what, proxy, missing in (("that goes", opened, 4.5), ("that was never there"
 os.remove(names[0])
 first_lost = simple.VDIReader(FileNames=names[:1] + names[2:])
 check(times_of(first_lost) == [3, 5, 7],
-      "a first file that isn't there gets a time before the others', %s" % times_of(first_lost))
-check(np.array_equal(shown_at(first_lost, 5.0), pictures[2]), "the other files are shown where the first one isn't there")
+      "a missing first file gets a time before the others', %s" % times_of(first_lost))
+check(np.array_equal(shown_at(first_lost, 5.0), pictures[2]), "the other files are shown where the first one is missing")
 
 
 # Values are uploaded when they're new, and only then.
@@ -285,13 +285,13 @@ amr = simple.HierarchicalFractal(Dimensions=8, TwoDimensional=0, Asymetric=0)
 fractal = vdi_of(amr, ("CELLS", "Fractal Volume Fraction"), CameraPosition=[8, 6, 9], CameraFocalPoint=[0, 0, 0])
 check(picture(fractal).max() > 60, "an AMR data set of " + amr.GetClientSideObject().GetOutputDataObject(0).GetClassName())
 
-# An abort leaves what was there.
+# An abort leaves the previous picture.
 aborted = vdi_of(wavelet)
 kept = picture(aborted)
 algorithm = aborted.GetClientSideObject()
 observer = algorithm.AddObserver("ProgressEvent", lambda *_: algorithm.SetAbortExecuteAndUpdateTime())
 aborted.CameraPosition = [50, 60, 75]
-check(np.array_equal(picture(aborted), kept), "an abort leaves the picture that was there")
+check(np.array_equal(picture(aborted), kept), "an abort leaves the previous picture")
 algorithm.RemoveObserver(observer)
 algorithm.SetAbortExecute(0)
 aborted.CameraPosition = [50, 60, 76]
@@ -302,7 +302,7 @@ check(errors_of(lambda: vdi_of(simple.Tetrahedralize(Input=wavelet)).UpdatePipel
 plane = simple.Wavelet(WholeExtent=[0, 9, 0, 9, 3, 3])
 check(errors_of(lambda: vdi_of(plane).UpdatePipeline()), "data of one point along an axis are refused")
 check(errors_of(lambda: vdi_of(wavelet, CameraViewAngle=0).UpdatePipeline()), "a camera without an angle of view is refused")
-check(errors_of(lambda: vdi_of(wavelet, ("POINTS", "nothing")).UpdatePipeline()), "an array that isn't there is refused")
+check(errors_of(lambda: vdi_of(wavelet, ("POINTS", "nothing")).UpdatePipeline()), "a missing array is refused")
 check(errors_of(lambda: simple.RenderVDI(Input=wavelet).UpdatePipeline()), "RenderVDI refuses an image that is no VDI")
 broken = os.path.join(OUTPUT, "broken.vdi")
 content = bytearray(open(path, "rb").read())

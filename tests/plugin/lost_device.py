@@ -42,7 +42,7 @@ view.CameraPosition = camera
 look(view)
 open(LOSE, "w").close()
 same = look(view)
-check(os.path.exists(LOSE) and pvtest.ssim(before, same) == 1.0, "a frame like the one before doesn't use the device")
+check(os.path.exists(LOSE) and pvtest.ssim(before, same) == 1.0, "a frame like the previous one doesn't use the device")
 view.CameraPosition = [2.2, 1.9, 2.5]
 after = look(view)
 check(not os.path.exists(LOSE), "a device is lost in a frame at rest")

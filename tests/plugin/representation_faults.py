@@ -62,7 +62,7 @@ scene.AnimationTime = reader.TimestepValues[0]
 check(look(view, "after").std() > 5 and not pvtest.message_in(view),
       "the step after the damaged file is shown, without a message")
 
-# A view that is closed while a VDI is loaded for it, whose last frame showed the one before.
+# A view that is closed while a VDI is loaded for it, whose last frame showed the previous one.
 for _ in range(3):
     other = pvtest.make_view(SIZE, [2.2, 1.9, 2.4], [0.5, 0.5, 0.5])
     simple.Show(reader, other)
@@ -91,7 +91,7 @@ simple.Show(picture, view)
 simple.Render(view)
 said = pvtest.message_in(view)
 check("no VDI in this data set" in said and "shows nothing" in said,
-      "a picture without a VDI gets a message, beside the empty VDI's")
+      "a picture without a VDI gets a message in addition to the empty VDI's")
 boxes = pvtest.text_boxes(view)
 check(len(boxes) == 2 and (boxes[0][0] > boxes[1][1] or boxes[1][0] > boxes[0][1]), "the two messages don't overlap")
 look(view, "no_vdi")
@@ -150,7 +150,7 @@ picture.PictureOnly = 0
 picture.CameraPosition, picture.CameraFocalPoint = [40, 30, 50], [0, 0, 0]
 simple.Show(picture, view)
 check(said_from([2.2, 1.9, 2.4]) == "From inside, this VDI is rough: press Regenerate From This View.",
-      "the filter's VDI tells of its button, beside another one's")
+      "the filter's VDI tells of its button, in addition to another one's message")
 check(said_from([2, -1, 20], [40, -1, 20]).count("VDI") == 1, "a message that two VDIs share is shown once")
 display = simple.GetDisplayProperties(reader, view)
 display.Opacity = 0

@@ -29,7 +29,7 @@ def range_of(proxy):
     return [round(proxy.RGBPoints[0], 4), round(proxy.RGBPoints[-4], 4)]
 
 
-# Rank 0 alone has a block.
+# Only rank 0 has a block.
 VECTORS = """
 import numpy as np
 from vtkmodules.util.numpy_support import numpy_to_vtk
@@ -76,7 +76,7 @@ vectors.SelectInputScalars = ["POINTS", "force"]
 check(not errors_of(vectors) and range_of(vectors.LookupTable) == [0, 5] and vectors.Component == 2,
       "rank %d: another array's component has its range %s" % (rank, range_of(vectors.LookupTable)))
 
-# A component that one rank's script sets alone is an error, and nobody waits for the rank that sets nothing.
+# A component that only one rank's script sets is an error, and nobody waits for the rank that sets nothing.
 if rank == 0:
     vectors.Component = 0
 with Messages("ErrorEvent") as texts:
@@ -115,7 +115,7 @@ if "views" in sys.argv:
     check(range_of(vectors.LookupTable) == [0, 3], "rank %d: the view's array has its range %s" % (
         rank, range_of(vectors.LookupTable)))
 
-# Rank 0 alone makes the output. It refuses an array's name that is too long for a file.
+# Only rank 0 makes the output. It refuses an array's name that is too long for a file.
 NAME = "x" * 2 ** 20
 named = simple.Calculator(Input=wavelet, Function="RTData", ResultArrayName=NAME)
 check("bytes" in errors_of(filter_of(named, NAME, LookupTable=image.LookupTable)),

@@ -79,7 +79,7 @@ def python_state():
     script = smstate.get_state()
     check(expected.max() > 60 and sets(script, "vdi", "Resolution") and not sets(script, "vdi", "Shade")
           and sets(script, r"\w+", "Shade"),
-          "the state has the VDI's size, and the volume's shading alone")
+          "the state has the VDI's size, and, of the volume's display, only the shading")
     simple.ResetSession()
     exec(script, {})
     again = simple.FindSource("vdi")

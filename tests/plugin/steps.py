@@ -116,7 +116,7 @@ print("a step while orbiting takes {} to read and pass on (the median; at most {
                          ms(np.median(others))))
 check(same(screenshot(view, "last"), expected[(COUNT - 1) % KINDS]), "a frame at rest shows the step that is asked for")
 
-# A step that nothing waits for is there after a while.
+# A step that nothing waits for is ready after a while.
 view.ViewTime = times[2]
 view.SMProxy.Update()
 place(view)

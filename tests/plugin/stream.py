@@ -22,7 +22,7 @@ def receive(link, patience=100):
 
 
 def arrives(link, expected):
-    """Whether a viewer gets that file. Files of earlier steps may come first, because encoding goes on beside the script."""
+    """Whether a viewer gets that file. Files of earlier steps may come first, because encoding goes on meanwhile."""
     end = time.monotonic() + 120
     while time.monotonic() < end:
         done = receive(link)

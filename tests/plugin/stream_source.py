@@ -93,7 +93,7 @@ def step_of(source):
 
 
 def screenshot(source):
-    """A picture of that source alone, from beside the VDI's viewpoint."""
+    """A picture of only that source, from a viewpoint near the VDI's."""
     simple.HideAll(view)
     simple.Show(source, view).SetRepresentationType("VDI")
     view.CameraPosition, view.CameraFocalPoint = [2.2, 1.4, 2.0], [0.5, 0.5, 0.5]

@@ -128,7 +128,7 @@ check(picture(again).max() == 0, "the release takes the prepared VDI")
 simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 1, 0.5, 0]
 check(picture(again).max() > 60, "after the release, edits count at once again")
 again.SMProxy.InvokeCommand("Prepare")
-check(percent_of(again) == -1, "a VDI that is there already isn't prepared")
+check(percent_of(again) == -1, "a VDI that exists already isn't prepared")
 
 # A file gets the VDI of the current properties and maps, not the one that the window shows.
 again.SMProxy.InvokeCommand("Hold")
@@ -148,7 +148,7 @@ for what in ("while edits rest", "while a VDI is made"):
     again.SMProxy.InvokeCommand("Prepare")
 again.SMProxy.InvokeCommand("Release")
 
-# An edit gives up what the one before began, and doesn't wait for that.
+# An edit gives up the work that the previous one began, and doesn't wait for it.
 again.Supersegments, again.Resolution, again.SamplingRate = 40, [1200, 900], 4
 simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 0.4, 0.5, 0]
 again.SMProxy.InvokeCommand("Prepare")

@@ -404,7 +404,7 @@ TEST_CASE("damaged messages of a server give whole levels or an error") {
   CHECK(refused > 100);
 }
 
-TEST_CASE("damaged bytes on a connection end that connection alone") {
+TEST_CASE("damaged bytes on a connection end only that connection") {
   ServerOptions options;
   options.listens = false;
   options.token = token;

@@ -204,7 +204,7 @@ TEST_CASE("messages that make no sense are refused") {
   }
 }
 
-TEST_CASE("levels are put together from parts in order alone") {
+TEST_CASE("levels are put together only from parts in order") {
   std::vector<std::byte> file(stream::chunkBytes + 1000);
   test::Noise noise(3);
   for (std::byte& b : file) b = static_cast<std::byte>(noise.below(256));

@@ -165,7 +165,7 @@ TEST_CASE("what stalled viewers keep is bounded, and the oldest goes first") {
   }
   CHECK_FALSE(good.viewer.isStalled());
   CHECK(good.taken == 40 * (coarseBytes + fullBytes));
-  // Three coarse levels are within the limit, beside the one of the newest frame.
+  // Three coarse levels are within the limit, in addition to the newest frame's.
   const auto left = std::count_if(stalled.begin(), stalled.end(),
                                   [](const auto& viewer) { return !viewer->viewer.isStalled(); });
   CHECK(left == 4);

@@ -55,7 +55,7 @@ bool isServing() {
          ::getpriority(PRIO_PROCESS, self) > niceness;
 }
 
-/// Lets allocations from the n-th on fail, `count` in turn.
+/// Makes `count` consecutive allocations fail, starting with the n-th.
 void arm(std::int64_t n, std::int64_t count) {
   hasFailed = false;
   toGo = n;
@@ -182,7 +182,7 @@ void view(Service& service, std::chrono::milliseconds patience) {
   if (hasFailed && inTurn > 1) (void)client->next(20ms);
 }
 
-/// Serves viewers while allocations fail, `count` in turn. Returns the number of rounds.
+/// Serves viewers while `count` consecutive allocations fail each time. Returns the number of rounds.
 int serve(double growth, std::int64_t count) {
   Service service;
   int rounds = 0;
@@ -267,7 +267,7 @@ void converse(const std::vector<std::string>& said, const stream::Controls& cont
   }
 }
 
-/// Conversations in which allocations fail, `count` in turn. Returns their number.
+/// Holds conversations in which `count` consecutive allocations fail. Returns their number.
 int converseWithoutMemory(std::int64_t count) {
   stream::Controls controls;
   controls.generator = stream::GeneratorControls{{0, 360}, 25, std::array{0.0, 0.5}, {"Viridis"}, 0.5};

@@ -92,6 +92,6 @@ TEST_CASE("copies of a field are side by side and share memory") {
   CHECK(values.size() == 2);
 }
 
-TEST_CASE("a field that isn't there is an error that lists those that are") {
+TEST_CASE("an unknown field is an error that lists the known ones") {
   CHECK_THROWS_WITH(DeviceField(device(), "cheese", 1), vdi::test::ContainsSubstring("mixing"));
 }

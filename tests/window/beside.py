@@ -1,5 +1,5 @@
 """By mouse: the first Apply, another array, another time step, and their undo, each of which needs a VDI that takes seconds.
-Prints the longest time that the window took to answer meanwhile, and checks that views alone get what was there before, and no
+Prints the longest time that the window took to answer meanwhile, and checks that only views get the previous output, and no
 view while an animation is played or saved.
 beside_scene.py runs inside ParaView. Needs VDI_PLUGIN and VDI_TEST_OUTPUT."""
 
@@ -25,7 +25,7 @@ def made(array, step):
 
 
 def check_answers(window, what, action, array, step, seconds=ANSWER_SECONDS):
-    """`action` requests that VDI. The window must answer until the VDI is there."""
+    """`action` requests that VDI. The window must answer until the VDI is ready."""
     with Pulse(window) as pulse:
         begin = time.monotonic()
         action()
@@ -95,7 +95,7 @@ def films(window):
         check(ssim(film, single) > 0.9999, "Save Animation has step %d" % step)
         if step > 0:
             check(ssim(film, path("step_%d.png" % (step - 1))) < 0.99,
-                  "step %d of the animation differs from the one before" % step)
+                  "step %d of the animation differs from the previous one" % step)
     inside("note_frames()")
     window.click("Play")
     wait_for("end of the animation", lambda: made("temperature", 3.0) and not inside("is_played()"), 60)

@@ -13,7 +13,7 @@ from window import COLOR_EDITOR, Pulse, Screen, Server, Window, check, failures,
 
 OUTPUT = output_folder("server")
 path = functools.partial(os.path.join, OUTPUT)
-# An edit kept the window from answering for 10 to 20 s before the server's ranks made VDIs beside their other
+# An edit kept the window from answering for 10 to 20 s before the server's ranks made VDIs during their other
 # work.
 ANSWER_SECONDS = 1.0
 

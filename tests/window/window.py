@@ -101,7 +101,7 @@ class Inside:
 class Session:
     """A D-Bus session for one ParaView, in a runtime folder of its own.
 
-    ParaView has to be started before anybody asks for the accessibility bus. Where that bus is there first, Debian's Qt 5.15.8
+    ParaView has to be started before anybody asks for the accessibility bus. Where that bus exists first, Debian's Qt 5.15.8
     (a11y_root.diff) may register its objects before it is connected, and then never answers."""
 
     def __init__(self):
@@ -448,7 +448,7 @@ class Window:
         return left - 7, top + 8
 
     def is_making(self, panel):
-        """Whether the panel says that the VDI is made anew. It looks in `panel` alone, because a small VDI is soon made."""
+        """Whether the panel says that the VDI is made anew. It looks only in `panel`, because a small VDI is soon made."""
         return self.text_that_begins("Making the VDI anew", panel) is not None
 
     def save(self, item, name, picture=None, extension=""):
@@ -682,7 +682,7 @@ class Pulse:
         self.address = window.bus.address
 
     def __enter__(self):
-        bus = Bus(self.address)  # of its own, beside what the test asks
+        bus = Bus(self.address)  # a separate connection, so that the test's queries aren't disturbed
         self.root = Widget(bus, bus.program(self.pid))
         self.thread = threading.Thread(target=self._ask)
         self.thread.start()

@@ -89,7 +89,7 @@ void Exchange::shareNewWindow(std::span<const std::uint64_t> sizes) {
   parts_.clear();
   everyHostShares_ = false;
   messages_ = true;
-  // Makes each outbox half as large again, so that slow growth does not need a new window every frame, and at
+  // Makes each outbox 1.5 times as large, so that slow growth does not need a new window every frame, and at
   // least twice the mean, because the load may move from one rank to another between frames.
   std::vector<std::uint64_t> parts;
   comm_.together([&] { parts.assign(sizes.begin(), sizes.end()); });

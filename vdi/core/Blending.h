@@ -1,4 +1,4 @@
-// Blend modes: how the scalars along a ray become a pixel. A VDI holds composite blending alone; pictures of
+// Blend modes: how the scalars along a ray become a pixel. A VDI holds only composite blending; pictures of
 // the volume show all modes.
 #pragma once
 

@@ -20,7 +20,7 @@ struct FaceTolerance {
   double depth = 0.0;
   double distance = 0.0;
 };
-/// For lists whose depths are at most `farthest`, with the step of DepthCode or 0.
+/// The tolerance for lists whose depths are at most `farthest`. `depthStep` is DepthCode's step, or 0.
 FaceTolerance faceToleranceOf(double depthStep, double farthest);
 
 }  // namespace vdi

@@ -13,7 +13,7 @@ namespace vdi {
 /// neither copied nor moved.
 class HostMemory {
  public:
-  /// Memory of this process alone. Throws Error{OutOfMemory}.
+  /// Memory private to this process. Throws Error{OutOfMemory}.
   static std::shared_ptr<HostMemory> anonymous(std::uint64_t bytes);
   /// POSIX shared memory that other processes of the host can open by its name, from publish until unlink or
   /// the end of this object. All of it is allocated here: a host with too little shared memory throws

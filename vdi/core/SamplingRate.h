@@ -13,7 +13,7 @@
 
 namespace vdi {
 
-/// The scalars along one sample of a ray. Its place and direction depend on `index` and the scene alone, so
+/// The scalars along one sample of a ray. Its place and direction depend only on `index` and the scene, so
 /// every decomposition of a volume has the same probes.
 struct Probe {
   /// Positions of the scalars relative to the probe's place, in samples at rate 1.

@@ -25,7 +25,7 @@ Scene localScene(std::span<const Block> blocks);
 float snapToScene(const Scene& scene, double value, int axis);
 
 /// Sample k of every ray covers the depths [first + k * step, first + (k + 1) * step] and is taken at the
-/// middle. The lattice depends on the scene and the camera alone, so any decomposition of the data yields the
+/// middle. The lattice depends only on the scene and the camera, so any decomposition of the data yields the
 /// same samples.
 struct DepthLattice {
   double first = 0.0;       // depth, >= 0: samples lie in front of the eye

@@ -29,7 +29,7 @@ std::vector<Light> lightKit();
 ///     ambient + diffuse * (sum over lights of color * |normal . direction|).
 ///
 /// The normal is the direction of the scalar's gradient at the sample's middle, by central differences over
-/// one voxel of the block on each side. Where there is no gradient, ambient light alone remains. Opacity
+/// one voxel of the block on each side. Where there is no gradient, only ambient light remains. Opacity
 /// stays as it is. There are no specular highlights: they belong to one viewpoint.
 struct Shading {
   bool on = false;

@@ -61,7 +61,7 @@ void validate(const Vdi& vdi);
 void validateShape(const Vdi& vdi);
 /// Checks that there are width * height lists, and that the number of supersegments matches their offsets.
 void validateEnds(const Vdi& vdi);
-/// Checks lists [first, last) alone, each of at most `budget` supersegments. Messages number them from
+/// Checks only lists [first, last), each of at most `budget` supersegments. Messages number them from
 /// `firstList` on.
 template <typename Segment>
 void validateLists(const ListsOf<Segment>& lists, std::size_t first, std::size_t last,

@@ -36,8 +36,8 @@ class CastPass {
 
   /// The purpose of a dispatch. Volume renders the picture, or the extremes that it shows
   /// (CastParams::blendMode). Histogram counts the demand of lists, and CountLevels the counts that this rank
-  /// shares with others; both are for merging. Count is the first step of an algorithm (sensitivities or
-  /// tolerances, and counts), Write the second one (supersegments or pre-segments).
+  /// shares with others; both are for merging. Count finds sensitivities or tolerances, and counts. Write
+  /// stores supersegments (bisection) or pre-segments (merging).
   enum class Work { Volume, Histogram, CountLevels, Count, Write };
   struct Band {
     std::uint32_t width = 0;

@@ -14,8 +14,8 @@ namespace vdi::gpu {
 class CompositePass {
  public:
   explicit CompositePass(std::shared_ptr<Device> device);
-  /// The purpose of a dispatch: the histogram of lists (merging), the first step of the algorithm, or, after
-  /// a scan, its second step.
+  /// The purpose of a dispatch: the histogram of lists (merging), the algorithm's counting, or, after a scan,
+  /// its writing.
   enum class Work { Histogram, Count, Write };
   void record(Commands& commands, const shared::CompositeParams& params, Work work, Algorithm algorithm);
 

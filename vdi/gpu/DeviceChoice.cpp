@@ -32,7 +32,7 @@ const char* typeName(DeviceType type) {
   }
 }
 
-/// Digits alone are an index: as part of a name, "7" would select a device by its driver's version.
+/// A number is an index: as part of a name, "7" would select a device by its driver's version.
 bool selected(const DeviceSummary& device, std::size_t index, const std::string& selector) {
   if (selector.empty()) return true;
   if (std::all_of(selector.begin(), selector.end(), [](unsigned char c) { return std::isdigit(c) != 0; })) {

@@ -7,7 +7,7 @@
 namespace vdi::gpu {
 
 struct DeviceRequest {
-  /// Index (as `vdi info --devices` lists them) or part of the name, case-insensitive; digits alone are
+  /// Index (as `vdi info --devices` lists them) or part of the name, case-insensitive; a number is
   /// always an index. Empty: all devices. The best match is used; localRank distributes ranks over equally
   /// good ones.
   std::string selector;

@@ -25,7 +25,7 @@ class PipelineSet {
   /// Shares the uniforms of another set, which updates them. Has programs if that set does.
   PipelineSet(const PipelineSet& updated, ComputePipelineInfo common);
   ComputePipeline& with(const std::vector<std::uint32_t>& specialization);
-  /// Compiles a pipeline for the device, so that its first use won't wait. Any thread may call it beside the
+  /// Compiles a pipeline for the device, so that its first use won't wait. Any thread may call it during the
   /// other calls.
   void compile(const std::vector<std::uint32_t>& specialization) const;
   /// Sets the uniforms of all pipelines for the commands recorded next; records nothing if the values are

@@ -29,7 +29,7 @@ class RenderPass {
   /// Call after a barrier. Sets the queue of `params`. `form` is one of shared::renderPicture....
   void record(Commands& commands, shared::RenderParams params, const shared::RenderRays& rays,
               Reconstruction reconstruction, std::uint32_t form);
-  /// Compiles the pipeline that most views need. Any thread may call it beside the other calls.
+  /// Compiles the pipeline that most views need. Any thread may call it during the other calls.
   void compile(Reconstruction reconstruction, std::uint32_t form) const;
 
  private:

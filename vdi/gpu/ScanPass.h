@@ -21,8 +21,8 @@ class ScanPass {
   /// of this pass may be running.
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count);
   /// Also records whether the total fits: `guard` (a word) becomes 1 if the total is at most `room` and the
-  /// word `before`, if given, is 1; else 0. Later dispatches do nothing if it is 0, before the host has the
-  /// total.
+  /// word `before`, if given, is 1; else 0. Later dispatches are skipped on the device if it is 0, before
+  /// the host knows the total.
   void record(Commands& commands, const Buffer& values, const Buffer& prefix, std::uint32_t count,
               const Buffer& guard, std::uint64_t room, const Buffer* before = nullptr);
 
@@ -40,7 +40,7 @@ class ScanPass {
   PipelineSet pipelines_;  // without guard, with one, and with one that depends on another
   Buffer sums_;            // sums of workgroups
   /// Buffers that were too small for a later scan, kept because recorded commands may use them. They are few
-  /// and small, since each is half as large again as the one before.
+  /// and small, since each is 1.5 times as large as the previous one.
   std::vector<Buffer> outgrown_;
   Buffer overflow_;
 };

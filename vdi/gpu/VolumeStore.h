@@ -26,7 +26,7 @@ namespace vdi::gpu {
 class VolumeStore {
  public:
   explicit VolumeStore(std::shared_ptr<Device> device);
-  ~VolumeStore();  // waits for blocks on their way
+  ~VolumeStore();  // waits for pending uploads
   VolumeStore(const VolumeStore&) = delete;
   VolumeStore& operator=(const VolumeStore&) = delete;
   VolumeStore(VolumeStore&&) = delete;
@@ -36,19 +36,19 @@ class VolumeStore {
   /// shapes and types are those of the last call. A value takes 1 byte if it has 8 bits (2 on a CPU device,
   /// whose 8-bit filter rounds to 8 bits), 2 bytes if it has 16, and else 4 (u32, i32 and f64 relative to the
   /// block's own range). Throws Error: OutOfMemory with figures; InvalidArgument for overlapping blocks or
-  /// too many pages. After a throw the store is empty. Drops blocks on their way, with their memory.
+  /// too many pages. After a throw the store is empty. Drops pending uploads, with their memory.
   void setBlocks(std::span<const Block> blocks, const Scene& scene);
 
   /// Starts to send the next step's blocks to memory of their own, in the background; the blocks shown stay.
   /// Host data must stay unchanged until awaitNext, or until another call of this or of setBlocks, which
-  /// drops them. Throws as setBlocks does; then none are on their way.
+  /// drops them. Throws as setBlocks does; then no upload is pending.
   void setNextBlocks(std::span<const Block> blocks, const Scene& scene);
   /// Waits for the next blocks. Throws the error that stopped them, and Error{InvalidArgument} if none are on
   /// their way.
   void awaitNext();
   /// Shows the next blocks. Call after awaitNext.
   void showNext();
-  /// Waits until nothing is on its way any more, since an upload cannot be stopped, and drops the next
+  /// Waits until no upload is pending any more, since an upload cannot be stopped, and drops the next
   /// blocks.
   void dropNext();
 

@@ -14,7 +14,7 @@ namespace vdi::gpu {
 
 namespace {
 
-/// A device for this process alone, with every feature that `limits` and Device::create promise.
+/// A device private to this process, with every feature that `limits` and Device::create promise.
 VkDevice makeDevice(const DeviceCandidate& chosen) {
   const float priority = 1.0F;
   const auto queueOf = [&priority](std::uint32_t family) {

@@ -20,7 +20,7 @@ namespace vdi::gpu {
 struct DeviceCandidate;
 class Instance;
 
-/// A queue's purpose. On hardware with copy engines, Transfer is their queue: its submissions run beside
+/// A queue's purpose. On hardware with copy engines, Transfer is their queue: its submissions overlap with
 /// computation. Elsewhere both are the same queue.
 enum class QueueKind { Compute, Transfer };
 

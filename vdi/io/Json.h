@@ -70,7 +70,7 @@ class JsonValue {
 JsonValue parseJson(std::string_view text, const std::string& name, const JsonLimits& limits = {});
 
 /// The text of a file. Throws Error{Io} unless it is a regular file that can be read. Throws Error{Format} if
-/// it is larger than the limit, and doesn't read it then.
+/// it is larger than the limit, without reading it.
 std::string readJsonText(const std::string& path, const JsonLimits& limits = {});
 
 }  // namespace vdi::io

@@ -27,8 +27,8 @@ std::uint32_t unfold(std::uint32_t folded) {
   return (folded >> 1) ^ (0U - (folded & 1U));
 }
 
-/// The context of a prediction: the supersegment at the same position in the list before, and the depth where
-/// this one begins if it follows the previous one without a gap.
+/// The context of a prediction: the supersegment at the same position in the previous list, and the depth
+/// where this one begins if it follows the previous one without a gap.
 template <typename Coding>
 struct Context {
   typename Coding::Fields reference{};
@@ -191,7 +191,7 @@ class Traversal {
     if (count > 0) return first + std::min(place_, count - 1);
     return next_ > 0 ? next_ - 1 : none;
   }
-  std::pair<std::size_t, std::size_t> before_{0, 0};  // first index and count of the list before
+  std::pair<std::size_t, std::size_t> before_{0, 0};  // first index and count of the previous list
   std::pair<std::size_t, std::size_t> list_{0, 0};
   std::size_t place_ = 0;
   std::size_t next_ = 0;

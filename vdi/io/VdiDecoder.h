@@ -15,7 +15,7 @@ namespace vdi::io {
 /// Memory follows the bytes that have come, not those that are announced. Belongs to one thread at a time.
 class VdiDecoder {
  public:
-  /// For a file of `fileBytes` bytes.
+  /// `fileBytes` is the size of the file.
   explicit VdiDecoder(std::uint64_t fileBytes);
   ~VdiDecoder();
   VdiDecoder(VdiDecoder&&) noexcept;

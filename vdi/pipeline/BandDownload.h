@@ -9,8 +9,8 @@
 
 namespace vdi::detail {
 
-/// Downloads into memory of this process alone; once a band's lists are destroyed, the next band reuses their
-/// memory.
+/// Downloads into memory private to this process; once a band's lists are destroyed, the next band reuses
+/// their memory.
 class BandDownload {
  public:
   explicit BandDownload(std::shared_ptr<gpu::Device> device);
@@ -20,7 +20,7 @@ class BandDownload {
   BandDownload(BandDownload&&) = delete;
   BandDownload& operator=(BandDownload&&) = delete;
 
-  /// The transfer queue copies the lists after the commands that write them, beside other work of the device.
+  /// The transfer queue copies the lists after the commands that write them, during other work of the device.
   /// The lists are complete when this returns.
   template <typename Segment>
   ListsOf<Segment> get(const DeviceLists& band);

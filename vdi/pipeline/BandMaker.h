@@ -55,7 +55,7 @@ class BandMaker {
     gpu::Buffer depths;         // [pixelCount] float
     gpu::Submission flattened;  // writes both buffers
   };
-  /// Collective: makes a flat picture from runs alone. It is the limit case of the paper's section 5.3: one
+  /// Collective: makes a flat picture only from runs. It is the limit case of the paper's section 5.3: one
   /// supersegment per run, composited in order of depth. `pass`, which is collective, waits for a composited
   /// band (Compositor::finish) and sends it on; it is not called for the last band.
   void makeFlat(const RayCaster::Inputs& inputs, const Progress& progress, std::vector<FlatBand>& flat,
@@ -106,7 +106,7 @@ class BandMaker {
   comm::Ownership ownershipOf(const RayCaster::Cast& cast, const Bands& all, std::size_t band,
                               std::span<const std::uint32_t> weights) const;
   /// Collective: sends this rank's lists, band after band, to their owners, which merge them by depth. The
-  /// device makes the next band while one is on its way.
+  /// device makes the next band while one travels.
   struct OwnedSteps {
     FunctionRef<void()> started;                  // collective; called while the first band is being made
     FunctionRef<void(std::size_t band)> compose;  // submits the work on a merged band

@@ -29,8 +29,8 @@ class Compositor {
   };
 
   /// Puts all ranks' supersegments of some lists in order of depth. The device goes on after this returns:
-  /// `parts` and `interleaved` must stay until `finish`. The transfer queue copies the received lists beside
-  /// the device's computation. `behind` records the steps that follow.
+  /// `parts` and `interleaved` must stay until `finish`. The transfer queue copies the received lists while
+  /// the device computes. `behind` records the steps that follow.
   void interleave(const Distributed& parts, const DepthCode& code, DeviceLists& interleaved,
                   const ListBuilder::Behind& behind = {});
 

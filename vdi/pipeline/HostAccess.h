@@ -25,11 +25,12 @@ class HostAccess {
 
   const std::shared_ptr<HostMemory>& memory() const { return memory_; }
 
-  /// Copies from the device to `at` bytes into the memory. Complete once the commands are done and `finish`
-  /// was called.
+  /// Copies from the device to byte offset `at` of the memory. The copy is complete once the commands have
+  /// run and `finish` has been called.
   void recordWrite(gpu::Commands& commands, const gpu::Buffer& from, std::uint64_t fromOffset,
                    std::uint64_t at, std::uint64_t bytes);
-  /// Copies from `at` bytes into the memory to the device. The memory must hold the data when this is called.
+  /// Copies from byte offset `at` of the memory to the device. The memory must hold the data when this is
+  /// called.
   void recordRead(gpu::Commands& commands, std::uint64_t at, const gpu::Buffer& to, std::uint64_t toOffset,
                   std::uint64_t bytes);
   /// Call after the commands complete; copies staged data to the host.

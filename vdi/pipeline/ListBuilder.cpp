@@ -138,7 +138,7 @@ void ListBuilder::recordTotal(const gpu::Buffer& offsets, std::uint32_t listCoun
                  which * sizeof(std::uint32_t), sizeof(std::uint32_t));
 }
 
-/// Submits the search alone, because the host must allocate memory before the second step.
+/// Submits only the search, because the host must allocate memory before anything is written.
 void ListBuilder::submitBisection(const gpu::Submission& after) {
   const std::uint32_t listCount = started_->options.listCount();
   DeviceLists& lists = *started_->lists;
@@ -265,7 +265,7 @@ void ListBuilder::recordReduce() {
   reduce_.record(commands_, constants, options.maxPerList);
 }
 
-/// Submits all steps at once. They use the memory for pre-segments and supersegments of the frame before; if
+/// Submits all steps at once. They use the previous frame's memory for pre-segments and supersegments; if
 /// it is too small, the steps that need it do nothing.
 void ListBuilder::submitMerging(From from, const gpu::Submission& after) {
   commands_.begin();

@@ -40,8 +40,8 @@ struct BandTargets {
 /// The form, for shaders, in which lists with this depth code are stored.
 gpu::shared::StoredForm storedForm(const DepthCode& code);
 
-/// Device milliseconds of all steps, of the algorithm's first step, and of its second one, each with its
-/// prefix sum.
+/// Device milliseconds of all steps, of the algorithm's counting, and of its writing, each with its prefix
+/// sum.
 struct ListTimes {
   double all = 0.0;
   double count = 0.0;
@@ -61,7 +61,7 @@ class ListBuilder {
   /// The most device bytes that a list of `maxCount` supersegments takes.
   static std::uint64_t bytesPerList(std::uint32_t maxCount, Algorithm algorithm);
 
-  /// Records the dispatch of the algorithm's first step, or with `write` its second one.
+  /// Records the dispatch that counts, or with `write` the one that writes.
   using Record = std::function<void(gpu::Commands&, const BandTargets&, bool write)>;
 
   struct Options {

@@ -16,7 +16,7 @@
 
 namespace vdi::detail {
 
-/// A particle on its way to a block.
+/// A particle to send to a block.
 struct RoutedParticle {
   std::int32_t rank;
   gpu::shared::DepositParticle particle;

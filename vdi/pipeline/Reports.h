@@ -13,9 +13,9 @@ struct RankReport {
   double uploadSeconds = 0.0;          // setBlocks, or setNextBlocks and advance, since the last frame
   double generateSeconds = 0.0;        // casting and segmenting, transfers included
   double generateDeviceSeconds = 0.0;  // device work in generateSeconds, without transfers
-  /// Device work of the first step: bisection's search or the counting of pre-segments.
+  /// Device work before anything is written: bisection's search or the counting of pre-segments.
   double countSeconds = 0.0;
-  double writeSeconds = 0.0;  // device work of the second step
+  double writeSeconds = 0.0;  // device work of writing supersegments (bisection) or pre-segments
   double distributeSeconds = 0.0;
   double compositeSeconds = 0.0;
   double compositeDeviceSeconds = 0.0;  // device work in compositeSeconds, and copies of received lists

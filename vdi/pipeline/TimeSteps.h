@@ -1,5 +1,5 @@
-// The volume's time steps on all ranks' devices: the one shown, and the next one on its way. Not part of the
-// library's interface.
+// The volume's time steps on all ranks' devices: the one shown, and the next one while it is uploaded. Not
+// part of the library's interface.
 #pragma once
 
 #include <cstdint>

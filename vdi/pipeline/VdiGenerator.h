@@ -42,7 +42,7 @@ class VdiFrame {
 
 /// Makes VDIs of distributed volumes. Every function is collective: each rank of the communicator has a
 /// generator with its own device, and calls the same functions in the same order. When a call throws, it
-/// throws on every rank (Communicator::agree), and the object stays usable.
+/// throws on every rank (Communicator::together), and the object stays usable.
 class VdiGenerator {
  public:
   VdiGenerator(std::shared_ptr<gpu::Device> device, comm::Communicator comm,
@@ -61,10 +61,10 @@ class VdiGenerator {
   /// Starts to send the next time step's blocks to the device and returns, so that they arrive while frames
   /// of the current blocks are made. The scalars must stay unchanged until advance, or until another call of
   /// this or of setBlocks, which drops them. Takes memory for a second volume, which the next setBlocks gives
-  /// back. After a throw, no blocks are on their way.
+  /// back. After a throw, no upload is pending.
   void setNextBlocks(std::vector<Block> blocks, bool fillGhosts = true);
   /// Waits for the next blocks and shows them. Throws the error that stopped them, and Error{InvalidArgument}
-  /// if none are on their way; then the current blocks stay.
+  /// if no upload is pending; then the current blocks stay.
   void advance();
 
   const Scene& scene() const;              // global

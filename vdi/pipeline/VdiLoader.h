@@ -48,7 +48,7 @@ class VdiLoader {
   /// Alone: the loader has the device to itself. Beside: renders go on meanwhile.
   enum class Kind { Alone, Beside };
   /// Copies the VDI. Alone, the device goes on after this returns (for VDIs of up to 128 MiB; larger ones
-  /// wait for all but their last part). Beside, the VDI is loaded when this returns.
+  /// wait for all but their last part). With Kind::Beside, the VDI is loaded when this returns.
   void load(const Vdi& vdi, LoadedVdi& target, Kind kind);
 
   /// Starts to load from the device's lists, band after band; `header` is the VDI without lists. `target`

@@ -33,7 +33,7 @@ class VdiRenderer {
   /// their last part).
   void setVdi(const Vdi& vdi);
   /// Double buffering: copies the VDI into buffers of its own, while renders go on with the current VDI. Call
-  /// from any one thread, but not beside setVdi, showPrepared or another prepareVdi. Returns when the VDI is
+  /// from any one thread, but not during setVdi, showPrepared or another prepareVdi. Returns when the VDI is
   /// on the device. Takes memory for a second VDI, and keeps it for the next one. Throws Error{OutOfMemory}
   /// if memory is short; the current VDI stays.
   void prepareVdi(const Vdi& vdi);
@@ -59,7 +59,7 @@ class VdiRenderer {
   ImageBytes renderBytes(const View& view, std::span<const float> ends, Alpha alpha,
                          Reconstruction reconstruction = defaultReconstruction);
   /// Compiles the device's program for renderBytes with premultiplied colours, unless it is compiled, so that
-  /// the first view with this reconstruction won't wait. Any thread may call it beside the other calls.
+  /// the first view with this reconstruction won't wait. Any thread may call it during the other calls.
   void compile(Reconstruction reconstruction) const;
   double renderMilliseconds() const;  // device time of the last render
 

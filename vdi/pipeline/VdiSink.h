@@ -45,7 +45,7 @@ class VdiSink {
   /// makes the next band meanwhile. Adds its times to `report`.
   virtual gpu::Submission add(const Band& band, const Wait& wait, RankReport& report) = 0;
 
-  /// Returns when the VDI is at its destination, or on its way there on the device.
+  /// Returns when the VDI is at its destination, or when the device's queued work will bring it there.
   virtual void finish(RankReport& report) = 0;
 
   /// Drops the lists added so far.

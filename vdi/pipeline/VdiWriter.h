@@ -35,9 +35,9 @@ class VdiWriter {
   VdiWriter(const comm::Communicator& comm, int root, const std::filesystem::path& path, const Vdi& header,
             WrittenBy writtenBy = WrittenBy::Owner);
 
-  /// Not collective; call within Communicator::together. Adds some of this rank's lists, which are the VDI's
-  /// from `firstList` on. Any rank may add any list, each list once. Incomplete chunks are copied. The file's
-  /// first chunks are written at once if the root has them.
+  /// Not collective; call within Communicator::together. Adds consecutive lists of this rank, starting at
+  /// list `firstList` of the VDI. Any rank may add any list, each list once. Incomplete chunks are copied.
+  /// The file's first chunks are written at once if the root has them.
   void add(std::uint64_t firstList, const ListsOf<Segment>& lists);
 
   /// Collective; call when all ranks have added their lists. Returns the same on all ranks.

@@ -93,7 +93,7 @@ SampleRange clippedSamples(const SampleRange& samples, const RayPart& part, floa
 /// The bounds of the visible part (scene or region) seldom lie half-way between two samples: the first
 /// sample's interval starts where the ray enters them, the last one's ends where it leaves. If a ray leaves
 /// them before it reaches the middle of any sample, the part between is one sample, and its middle decides
-/// its owner. This depends on ray and scene alone, so it is the same on every rank.
+/// its owner. This depends only on ray and scene, so it is the same on every rank.
 struct SceneStretch {
   SampleRange samples;
   float enter = 0.0F;  // depth

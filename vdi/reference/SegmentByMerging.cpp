@@ -1,4 +1,5 @@
-// The shaders' twin is shaders/pre_segments.glsl (step 2) and shaders/reduce.comp (step 3).
+// Lists by merging (segmentByMerging in Segmenter.h). The shaders' twins are count_pre_segments.glsl (step
+// 1), interpolate.comp (step 2), write_pre_segments.glsl (step 3), merging.glsl and reduce.comp (step 4).
 #include <algorithm>
 #include <cmath>
 #include <limits>

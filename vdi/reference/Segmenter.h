@@ -68,34 +68,38 @@ using shared::maxTries;
 using shared::smallestSensitivity;
 std::vector<Supersegment> segmentByBisection(std::span<const Interval> intervals, const SegmentRules& rules);
 
-/// The default: no search for a sensitivity, and no single threshold for the whole list.
-///   1. If there are no more visible intervals than the list may hold (see above), each becomes a
-///      supersegment.
-///   2. Pre-segments: neighbouring intervals join as long as their deviation from the pre-segment's first one
+/// The default: no search for a sensitivity, and no single threshold for the whole list. If there are no more
+/// visible intervals than the list may hold (see above), each becomes a supersegment. Otherwise, in the steps
+/// of docs/architecture.md:
+///   1. Count. Neighbouring intervals join to a pre-segment as long as their deviation from its first one
 ///      stays within a tolerance. The deviation is the sum of w * |x - x_first| * length / sampleStep, where
 ///      x is colour and opacity over one sample, and w = hiddenWeight + (1 - hiddenWeight) * transmittance in
-///      front is how much V_O sees of it. The tolerance is the smallest of finestTolerance *
-///      toleranceRatio^j, j = 0 .. toleranceLevels - 1, that gives at most preSegmentsPerBudget * budget
-///      pre-segments (or the number of runs, if that is larger); if none does, it is infinite. As in
-///      segmentWithSensitivity, a transparent interval opens no pre-segment, and a transparent tail is
-///      trimmed.
-///   3. While there are more pre-segments than the list may hold, a round merges neighbours. The cost of
-///      merging two is the sum over both, and over the empty space between them, of w * |x - x_mean| *
+///      front is how much V_O sees of it. As in segmentWithSensitivity, a transparent interval opens no
+///      pre-segment, and a transparent tail is trimmed. The list's tolerance is the smallest of
+///      finestTolerance * toleranceRatio^j, j = 0 .. toleranceLevels - 1, that gives at most
+///      preSegmentsPerBudget * budget pre-segments (or the number of runs, if that is larger); if none does,
+///      it is infinite.
+///   2. Interpolate. A list that wasn't counted gets its tolerance from the counted ones around it
+///      (interpolatedTolerance).
+///   3. Write the pre-segments with that tolerance.
+///   4. Merge. While there are more pre-segments than the list may hold, a round merges neighbours. The cost
+///      of merging two is the sum over both, and over the empty space between them, of w * |x - x_mean| *
 ///      length. Front to back, two are merged if that costs no more than the limit, and no more than merging
 ///      either of them with its other neighbour (of equal costs, those at even places count as less), until
 ///      enough are merged. In the first round, the limit is the mean of all costs; later, it is the mean of
-///      the costs, at that time, of the mergers that the round before left out. (As measured, this is as good
-///      as always merging the cheapest pair, and it does not search a list again for each merger.)
+///      the costs, at that time, of the mergers that the previous round left out. (As measured, this is as
+///      good as always merging the cheapest pair, and it does not search a list again for each merger.)
+///   5. Store the rest as supersegments (Compaction.h).
 /// One pass along the ray counts all tolerances side by side, so a device needs two passes in all
-/// (Budget::Total takes one more, for its SupersegmentHistogram). Where no gaps must be kept, only one ray of
-/// countedStride x countedStride is counted (see ListTolerance).
+/// (Budget::Total takes one more, for its SupersegmentHistogram). It counts only one ray of countedStride x
+/// countedStride (see ListTolerance).
 using shared::finestTolerance;
 using shared::hiddenWeight;
 using shared::preSegmentsPerBudget;
 using shared::toleranceLevels;
 using shared::toleranceRatio;
 
-/// The bounds of step 2 for a list: its tolerance, and the number of pre-segments counted. There is room for
+/// The bounds of step 3 for a list: its tolerance, and the number of pre-segments counted. There is room for
 /// a few more. When less than sparePreSegments of that room is left, the tolerance grows by toleranceRatio
 /// with each further pre-segment, and the last one takes all the rest. So a list that was not counted cannot
 /// overflow, however wrong its interpolated tolerance is. Runs are not bounded this way: a device that finds

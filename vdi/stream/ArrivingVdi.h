@@ -17,7 +17,7 @@ namespace vdi::stream {
 /// together, on as many cores as they keep busy.
 class ArrivingVdi {
  public:
-  /// For a .vdi file of `fileBytes` bytes.
+  /// `fileBytes` is the size of the .vdi file.
   explicit ArrivingVdi(std::uint64_t fileBytes);
   /// Takes the next bytes, of which it keeps a copy.
   void add(std::span<const std::byte> bytes);

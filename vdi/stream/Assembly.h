@@ -17,7 +17,7 @@ namespace vdi::stream {
 /// A whole level: a .vdi file that hasn't been checked yet, or its VDI.
 struct Received {
   Level level;
-  std::vector<std::byte> file;  // empty if `vdi` is there instead
+  std::vector<std::byte> file;  // empty if `vdi` has a value instead
   std::optional<ArrivingVdi> vdi;
   std::string missing;  // why a requested frame has no file; only level.frame is set then
   std::string session;  // the frame's session, set by Client
@@ -32,8 +32,8 @@ class Assembly {
  public:
   enum class Gives { Files, Vdis };
   explicit Assembly(Gives gives = Gives::Files) : gives_(gives) {}
-  /// Begins the next level, and drops the one before if it is incomplete. Throws Error{Format} if `level` has
-  /// more than `mostBytes`.
+  /// Begins the next level, and drops the previous one if it is incomplete. Throws Error{Format} if `level`
+  /// has more than `mostBytes`.
   void begin(const Level& level, std::uint64_t mostBytes);
   /// Adds a binary message, and returns the level that it completes. Throws Error{Format} unless it is the
   /// next part of the level that was begun.

@@ -27,7 +27,7 @@ constexpr std::chrono::milliseconds firstPause{250};
 constexpr std::chrono::milliseconds longestPause{5000};
 constexpr std::chrono::seconds longestEnd{2};
 /// Limits that a server doesn't reach if it waits for acknowledgements.
-constexpr std::uint64_t mostAhead = std::uint64_t{32} << 20;  // bytes, beside a whole level
+constexpr std::uint64_t mostAhead = std::uint64_t{32} << 20;  // bytes, in addition to a whole level
 constexpr std::size_t mostWaiting = 65536;
 constexpr std::size_t longestSeries = std::size_t{1} << 20;
 

@@ -25,7 +25,7 @@ namespace {
 
 namespace limits {
 
-// Times after which a connection is cut off: for its request, for taking the reply, and for a viewer's hello.
+// Timeouts for sending the request, for reading the reply, and for a viewer's hello.
 constexpr std::chrono::seconds request{10};
 constexpr std::chrono::seconds reply{30};
 constexpr std::chrono::seconds hello{5};
@@ -151,7 +151,7 @@ class SocketConnection : public Connection, public std::enable_shared_from_this<
       }
       try {
         self->receive();
-      } catch (const std::exception&) {  // without memory, this connection alone is lost
+      } catch (const std::exception&) {  // without memory, only this connection is lost
         self->end();
         throw;
       }
@@ -168,7 +168,7 @@ class SocketConnection : public Connection, public std::enable_shared_from_this<
     }
     buffer_.consume(data.size());
     pump();
-    // async_close reads what is left by itself. Another read beside it might never end.
+    // async_close reads what is left by itself. A concurrent read might never end.
     const bool isClosing = isWriting_ && std::holds_alternative<Viewer::Farewell>(outgoing_);
     if (!isClosing) listen();
   }

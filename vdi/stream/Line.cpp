@@ -189,7 +189,7 @@ class SocketLine : public Line, public std::enable_shared_from_this<SocketLine> 
       } else {
         self->events_.binary({bytes, data.size()});
       }
-      // async_close reads what is left by itself. Another read beside it might never end.
+      // async_close reads what is left by itself. A concurrent read might never end.
       if (self->hasEnded_ || self->isClosing_) return;
       self->buffer_.consume(data.size());
       self->read();

@@ -47,7 +47,7 @@ class Outbox {
   std::uint64_t dropped() const { return dropped_; }
   /// The bytes per second that the viewer takes, estimated from acknowledgements and the limit; 0: unknown.
   double rate() const;
-  /// Whether so many bytes take no longer than the time between frames, as far as known.
+  /// Whether that many bytes fit between two frames, as far as is known.
   bool isFastEnoughFor(std::uint64_t bytes) const;
   /// Bytes sent and not acknowledged.
   std::uint64_t underWay() const { return underWay_; }
@@ -90,8 +90,8 @@ class Outbox {
 
   FramePtr newest_;  // offered last
   FramePtr current_;
-  std::uint32_t firstLevel_ = 0;  // with which current_, or the frame before it, began
-  std::uint32_t nextLevel_ = 0;   // of current_: the one to begin; the one before it may be under way
+  std::uint32_t firstLevel_ = 0;  // with which current_, or the previous frame, began
+  std::uint32_t nextLevel_ = 0;   // of current_: the one to begin; the previous one may be under way
   std::uint64_t offset_ = 0;      // in the level before nextLevel_
   std::uint64_t dropped_ = 0;
   std::optional<Clock::time_point> offeredAt_;

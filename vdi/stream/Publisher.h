@@ -16,7 +16,7 @@
 
 namespace vdi::stream {
 
-/// Encodes on its own thread and those that the thread starts, at a lower priority than the simulation's.
+/// Encodes on its own thread and on threads that it starts, at a lower priority than the simulation's.
 class Publisher {
  public:
   /// The server must outlive the publisher.
@@ -40,7 +40,7 @@ class Publisher {
   };
   void work();
   void encode(const Pending& pending);
-  /// Keeps the error's text for trouble(), unless an earlier one is there.
+  /// Keeps the error's text for trouble(), unless it holds an earlier one.
   void note(const std::exception& error) noexcept;
 
   Server& server_;

@@ -319,7 +319,8 @@ class Server::Impl {
         } else {
           context_.run_for(acceptPause);  // serves the peers that there are, or learns that the server ends
         }
-      } catch (const std::exception& error) {  // from one connection, which is lost, or for want of memory
+      } catch (const std::exception& error) {
+        // One connection failed and is lost, or memory ran out.
         accepts = false;
         say(error.what());
         std::this_thread::sleep_for(failurePause);

@@ -65,7 +65,8 @@ class Server {
 
   /// Publishes the newest frame, or more levels of it.
   void publish(FramePtr frame);
-  /// Whether, by the frames so far, some viewer gets whole frames before the next ones come. Never waits.
+  /// Whether, judging by past frames, some viewer receives full levels before the next frame arrives. Never
+  /// waits.
   bool carriesWholeFrames() const;
   /// Answers with a frame of the series that a viewer asked for.
   void provide(FramePtr frame);

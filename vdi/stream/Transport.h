@@ -94,7 +94,7 @@ class Transport {
       typename boost::asio::async_result<std::decay_t<Handler>,
                                          void(boost::beast::error_code, std::size_t)>::return_type;
 
-  /// With TLS unless `tls` is null. `tls` must outlive the transport.
+  /// Uses TLS unless `tls` is null. `tls` must outlive the transport.
   Transport(Plain::socket_type socket, boost::asio::ssl::context* tls);
   Transport(boost::asio::io_context& context, boost::asio::ssl::context* tls);
 

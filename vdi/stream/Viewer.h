@@ -47,7 +47,7 @@ class Hub {
   void provide(const FramePtr& frame, Clock::time_point now);
   /// Tells the viewers that asked for a frame why there is none.
   void miss(const Missing& missing);
-  /// Whether a viewer still waits for that frame of the series, or looks at it.
+  /// Whether a viewer still waits for that frame of the series or is showing it.
   bool isWanted(std::uint32_t index) const;
   void append(const Series& entries);
   /// `cause`: why no frames come although they should.
@@ -61,8 +61,8 @@ class Hub {
   const std::optional<Series>& series() const { return series_; }
   std::uint32_t viewerCount() const { return static_cast<std::uint32_t>(viewers_.size()); }
   std::uint64_t published() const { return published_; }
-  /// Whether some viewer gets a frame as large as the newest one, in full, before the next one comes. Judges
-  /// a full level that isn't there yet by the finest coarse one.
+  /// Whether some viewer gets a frame as large as the newest one in full before the next frame comes. Judges
+  /// a full level that isn't encoded yet by the finest coarse one.
   bool carriesWholeFrames() const;
   State state() const { return {phase_, viewerCount(), cause_}; }
   /// The bytes of frames kept only because viewers still need them, without the newest frame.

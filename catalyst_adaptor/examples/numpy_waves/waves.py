@@ -37,7 +37,7 @@ def main():
     slow = (x - 0.55) ** 2 + (y - 0.5) ** 2 + (z - 0.5) ** 2 < 0.22 ** 2
     courant = np.where(slow, 0.08, 0.3)  # (speed * time step / spacing) squared
     now, before = (np.zeros((LAST - FIRST + 2, N + 2, N + 2)) for _ in range(2))
-    # Uses squares alone: exp's last bit may depend on the place of its argument in a vector.
+    # Uses only squares: exp's last bit may depend on the place of its argument in a vector.
     distance = ((x - 0.15) ** 2 + (y - 0.4) ** 2 + (z - 0.45) ** 2) / 0.15 ** 2
     now[INSIDE] = before[INSIDE] = np.maximum(1 - distance, 0) ** 2
 

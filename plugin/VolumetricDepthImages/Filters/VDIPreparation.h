@@ -1,4 +1,4 @@
-// A VDI that a thread makes beside ParaView's own work, on one rank or on several together.
+// A VDI that a thread makes in the background of ParaView's own work, on one rank or on several together.
 #ifndef VDIPreparation_h
 #define VDIPreparation_h
 
@@ -41,7 +41,7 @@ class Preparation {
   bool hasRanks() const { return Of->hasRanks(); }
   /// Whether this rank's thread has nothing left to do.
   bool isDone() const { return Done; }
-  /// The progress in percent: 100 once the VDI is there, -1 after it was given up or failed.
+  /// The progress in percent: 100 once the VDI is ready, -1 after it was given up or failed.
   int percent() const;
   /// Asks the thread to stop. The thread checks this once a band. One rank's call is enough.
   void giveUp() { Unwanted = true; }

@@ -36,7 +36,7 @@ void Regeneration::answer() {
 }
 
 vtkMTimeType Regeneration::time(vtkMTimeType now, bool forView) {
-  // An earlier output is good enough for views alone, until it is replaced.
+  // Only views may take an earlier output, until it is replaced.
   const bool isGoodEnough = asked_ && forView;
   const vtkMTimeType asked = isGoodEnough ? 0 : askedTime_.GetMTime();
   if (isHeld_ && (isGoodEnough || !asked_)) return std::max(executed_, asked);

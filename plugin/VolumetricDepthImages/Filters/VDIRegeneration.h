@@ -88,7 +88,7 @@ class Regeneration {
   /// Starts a thread that makes the output for these blocks. Collective on the volume's ranks.
   void prepare(std::shared_ptr<Volume> volume, const Origin& origin, vtkMTimeType now,
                Preparation::Make make);
-  /// Whether, on all ranks, the output for these blocks is being prepared or is there.
+  /// Whether, on all ranks, the output for these blocks is being prepared or is ready.
   bool isPrepared(const Origin& origin, vtkMultiProcessController* controller) const;
   /// Whether the preparation has ended on any rank. Call it after isPrepared.
   bool isPreparationDone(vtkMultiProcessController* controller) const;

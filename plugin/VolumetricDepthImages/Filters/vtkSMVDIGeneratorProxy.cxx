@@ -180,7 +180,7 @@ std::array<int, 2> resolutionOf(vtkSMViewProxy* view) {
 
 vtkStandardNewMacro(vtkSMVDIGeneratorProxy);
 
-/// What the clients of all ranks know of the input and its array, each of its own part.
+/// Each client's facts about its part of the input and of the array, gathered from all ranks.
 struct vtkSMVDIGeneratorProxy::InputOfRanks {
   int Components = 0;
   std::array<double, 2> Range{};  // the lower end is above the upper one if there are no values

@@ -114,7 +114,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   /**
    * The rule by which the scalars along a ray become a pixel, an enumerator of vdi::BlendMode: 0 (default)
    * composite, 1 maximum intensity, 2 minimum intensity, 3 isosurfaces of the IsosurfaceValues. A VDI holds
-   * composite blending alone: with another mode, an update fails unless PictureOnly is on.
+   * only composite blending: with another mode, an update fails unless PictureOnly is on.
    */
   vtkSetClampMacro(BlendMode, int, 0, 3);
   void AddIsosurfaceValue(double value);
@@ -184,7 +184,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   void EndView();
   int GetOutdated();
   ///@}
-  /// The preparation's progress in percent, 100 once its output is there. -1 if there is no preparation: none
+  /// The preparation's progress in percent, 100 once its output is ready. -1 if there is no preparation: none
   /// was begun, it was given up, it failed, or it is impossible (before the first update, and with
   /// PictureOnly).
   int GetPreparation();

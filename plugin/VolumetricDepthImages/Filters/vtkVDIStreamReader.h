@@ -29,7 +29,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamReader : public vtkImageAlgori
   void SetURL(const char* url);      // the link without its token
   void SetToken(const char* token);  // "": the token of TokenFile, or else of the environment
   void SetTokenFile(const char* file);
-  void SetAuthority(const char* file);  // a PEM file of certificates to trust beside the system's
+  void SetAuthority(const char* file);  // a PEM file of certificates to trust besides the system's
   ///@}
 
   /// The time in seconds that an update waits for the first VDI, as long as the server can be reached.

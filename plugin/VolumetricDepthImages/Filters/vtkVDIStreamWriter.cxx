@@ -46,7 +46,7 @@ struct vtkVDIStreamWriter::Service {
   vdi::stream::Server Server;
   vdi::stream::Publisher Publisher;
   std::unique_ptr<vdi::stream::SecretFile> Link;
-  std::string Told;  // the last reported trouble of the publisher
+  std::string Told;  // the publisher's problem reported last
 };
 
 vtkStandardNewMacro(vtkVDIStreamWriter);

@@ -58,8 +58,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
   vtkSetMacro(TimeStep, int);
 
 #ifndef __VTK_WRAP__
-  /// The viewers' request since the last call. Waits for it no longer than `patience`. Nullopt if there is
-  /// none, before the server has started, and without Steer.
+  /// The viewers' request since the last call. Waits at most `patience`. Nullopt if there is none, before the
+  /// server has started, and without Steer.
   std::optional<vdi::stream::SteeringRequest> TakeRequest(std::chrono::milliseconds patience);
   /// Tells viewers what they may ask for, and the values in force. Has no effect before the server has
   /// started.

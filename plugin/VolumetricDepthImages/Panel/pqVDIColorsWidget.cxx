@@ -138,7 +138,7 @@ void pqVDIColorsWidget::edit() {
     dialog->setAttribute(Qt::WA_DeleteOnClose);
     // A VDI uses transfer functions of one value.
     if (auto* planar = dialog->findChild<QCheckBox*>("Use2DTransferFunction")) planar->hide();
-    // The button alone takes edits back. The window's own ways to close a dialog keep them.
+    // Only the button takes edits back. The window's own ways to close a dialog keep them.
     if (auto* cancel = dialog->findChild<QPushButton*>("CancelButton"))
       this->connect(cancel, &QPushButton::clicked, this, &pqVDIColorsWidget::restore);
     this->keepMaps(map);

@@ -20,7 +20,7 @@ enum class ViewpointIssue;
 
 namespace pv {
 
-/// What a view shows of one VDI.
+/// How much of one VDI a view shows.
 struct VDISight {
   bool isShown = false;                      // whether the VDI can be seen at all
   std::optional<vdi::ViewpointIssue> issue;  // of vtkVDIProp::IssueIn

@@ -24,7 +24,7 @@ namespace pv {
 /// The problem after the VDI's filter or reader has failed, which reports the reason as an error.
 constexpr const char* failedUpstream = "There is no VDI to show: its filter or reader has failed.";
 
-/// The beginning of the problem while a source waits for a VDI (VDI.waiting).
+/// Prefix of the problem's text while a source waits for a VDI (VDI.waiting).
 constexpr const char* noneYet = "There is no VDI to show yet: ";
 /// Whether `problem` is one of these two. A view shows them, but doesn't repeat them as errors.
 bool isSaidUpstream(const std::string& problem);

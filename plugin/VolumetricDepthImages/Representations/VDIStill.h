@@ -1,4 +1,4 @@
-// A full picture of a VDI, made beside the views' thread.
+// A full picture of a VDI, made on another thread than the views'.
 #ifndef VDIStill_h
 #define VDIStill_h
 

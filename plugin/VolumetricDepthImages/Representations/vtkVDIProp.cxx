@@ -452,8 +452,8 @@ void vtkVDIProp::DrawNow(vtkOpenGLRenderWindow* window, const pv::StillView& vie
   vdi::VdiRenderer& views =
       form.thin ? internal.Buffers.thinRenderer(*form.thin) : internal.Buffers.renderer();
   vdi::Reconstruction reconstruction = view.reconstruction;
-  // Leaning faces take longer, so moving frames do without. A thinned VDI lacks the lists in which a surface
-  // goes on.
+  // Leaning faces take longer, so moving frames leave them out. A thinned VDI lacks the lists in which a
+  // surface continues.
   if (form.thin || internal.NextFrame == FrameKind::Interactive)
     reconstruction = std::min(reconstruction, vdi::Reconstruction::Smooth);
   const Clock::time_point renderStart = Clock::now();

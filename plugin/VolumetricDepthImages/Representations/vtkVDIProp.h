@@ -8,7 +8,7 @@
  * Interactive frames have as few pixels as it takes to draw the prop FrameRate times a second
  * (VDIFramePolicy). They show the last VDI while the next one is being loaded. Deferred frames do both, too,
  * while a thread makes the full picture (VDIStill). If neither the VDI nor the view has changed
- * since the frame before, the prop renders nothing: the picture is still in the texture (VDIPainter).
+ * since the previous frame, the prop renders nothing: the picture is still in the texture (VDIPainter).
  *
  * The view shows errors (MessageActor), and the prop reports each once. The rest of the picture is drawn. The
  * view also shows how far it is turned from the VDI's viewpoint (AngleActor).

@@ -54,7 +54,7 @@ bool drawsOnRanks() {
          module->GetNumberOfLocalPartitions() > 1;
 }
 
-/// Whether views are windows. In pvbatch and in simulations, views are for pictures alone.
+/// Whether views are windows. In pvbatch and in simulations, views are only for pictures.
 bool hasWindows() {
   return vtkProcessModule::GetProcessType() == vtkProcessModule::PROCESS_CLIENT;
 }

@@ -4,8 +4,8 @@
  *
  * Input: the output of vtkVDIGenerator or vtkVDIReader. The VDI goes to the process that shows pictures, the
  * client or the root, and is drawn there (vtkVDIProp): moving the camera moves no data. The view's other
- * objects are drawn there, too, because colours alone can't be merged by depth. If another representation
- * must be drawn on all ranks, as ParaView's Volume must, a message replaces the VDI.
+ * objects are drawn there, too, because colours without depths can't be merged by depth. If another
+ * representation must be drawn on all ranks, as ParaView's Volume must, a message replaces the VDI.
  */
 #ifndef vtkVDIRepresentation_h
 #define vtkVDIRepresentation_h
