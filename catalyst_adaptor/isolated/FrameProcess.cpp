@@ -81,7 +81,7 @@ void FrameProcess::hear(Milliseconds patience) {
     }
     if (received.result == Socket::Result::Nothing) return;
     if (received.result == Socket::Result::Gone) {
-      isGone_ = true;
+      isGone_ = isHungUp_ = true;
       return;
     }
     take(received);
@@ -146,6 +146,9 @@ std::string FrameProcess::end() const {
     cause = "was killed by signal " + std::to_string(number) + " (" + strsignal(number) + ")";
   } else if (status_) {
     cause = "ended with exit status " + std::to_string(WEXITSTATUS(*status_));
+  } else if (isHungUp_ && worker_ > 0) {
+    // A supervisor that can still do so tells how its worker ended.
+    cause = "was killed together with the one that supervises it, as by SIGKILL to both,";
   }
   return cause + " " + stage();
 }

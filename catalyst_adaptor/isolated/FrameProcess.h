@@ -89,6 +89,7 @@ class FrameProcess {
   SharedPages setup_;
   std::optional<int> startCode_;
   bool isGone_ = false;
+  bool isHungUp_ = false;      // the socket has no other end
   bool isGivenUp_ = false;     // because memory ran out
   std::optional<int> status_;  // the worker's, as waitpid has it
   pid_t worker_ = 0;

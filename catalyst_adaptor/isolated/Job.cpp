@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "catalyst_adaptor/isolated/Messages.h"
+#include "catalyst_adaptor/isolated/StepSignals.h"
 
 namespace vdi::catalyst {
 
@@ -115,11 +116,12 @@ Job::Job(const std::string& program, const std::vector<std::string>& command) {
   posix_spawn_file_actions_adddup2(&how.actions, written.number(), life);
   posix_spawn_file_actions_addclosefrom_np(&how.actions, life + 1);
   sigset_t all;
-  sigset_t none;
   sigfillset(&all);
-  sigemptyset(&none);
+  // Launchers handle these signals, so ignoring them wouldn't last. Blocking does.
+  sigset_t blocked = setOfStepSignals();
+  sigdelset(&blocked, endOfLauncher);
   posix_spawnattr_setsigdefault(&how.attributes, &all);
-  posix_spawnattr_setsigmask(&how.attributes, &none);
+  posix_spawnattr_setsigmask(&how.attributes, &blocked);
   posix_spawnattr_setflags(&how.attributes,
                            POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSID);
   pid_t starter = 0;
@@ -138,7 +140,7 @@ Job::Job(const std::string& program, const std::vector<std::string>& command) {
 
 Job::~Job() {
   if (process_ <= 0 || isOver(std::chrono::milliseconds(0))) return;
-  kill(process_, SIGTERM);
+  kill(process_, endOfLauncher);
   kill(process_, SIGCONT);
 }
 

@@ -5,6 +5,7 @@ import glob
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -22,41 +23,69 @@ ENGINE = 2
 SCRIPT = 3
 
 
+def is_of_run(path, name):
+    """Whether an environment in /proc is that of a process of the run with this name."""
+    try:
+        with open(path, "rb") as file:
+            return b"VDI_TEST_RUN=" + name.encode() in file.read()
+    except OSError:
+        return False
+
+
+def apart(name, programs=("vdi_catalyst_process", "mpirun", "orterun", "prterun", "prte", "mpiexec", "mpiexec.hydra")):
+    """The numbers of the run's processes that make its frames, as they are: worker, supervisor, launcher."""
+    found = {"work": [], "serve": [], "launcher": []}
+    for path in glob.glob("/proc/[0-9]*/environ"):
+        folder = os.path.dirname(path)
+        try:
+            with open(folder + "/cmdline") as file:
+                words = file.read().split("\0")
+        except OSError:
+            continue
+        if not is_of_run(path, name) or os.path.basename(words[0]) not in programs:
+            continue
+        if words[1] in found:
+            found[words[1]].append(int(os.path.basename(folder)))
+        elif "serve" in words:
+            found["launcher"].append(int(os.path.basename(folder)))
+    return found
+
+
 class Run:
     """The output of a simulation: the code of each step, the microseconds that it took, and lines of the adaptor."""
 
-    def __init__(self, what, steps, **environment):
+    def __init__(self, what, steps, meanwhile=None, **environment):
+        """Calls `meanwhile` with the run's name while the simulation runs."""
         text = what if isinstance(what, str) else json.dumps({**SMALL, **what})
         self.name = uuid.uuid4().hex
         start = time.monotonic()
-        process = subprocess.run([*simulation, text, str(steps)], env={**os.environ, "VDI_TEST_RUN": self.name, **environment},
-                                 capture_output=True, text=True, timeout=PATIENCE)
+        process = subprocess.Popen([*simulation, text, str(steps)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                   env={**os.environ, "VDI_TEST_RUN": self.name, **environment})
+        try:
+            if meanwhile:
+                meanwhile(self.name)
+            said, told = process.communicate(timeout=PATIENCE)
+        finally:
+            process.kill()
         self.seconds = time.monotonic() - start
-        print(process.stdout, process.stderr, "%.1f s" % self.seconds, flush=True)
+        print(said, told, "%.1f s" % self.seconds, flush=True)
         assert process.returncode == 0, process.returncode
-        self.lines = [line for line in process.stderr.splitlines() if line.startswith("vdi_catalyst: ")]
+        self.lines = [line for line in told.splitlines() if line.startswith("vdi_catalyst: ")]
         self.steps = [[int(word) for word in found] for found in
-                      re.findall(r"^step \d+ (\d+) (\d+) (\d+)$", process.stdout, re.M)]
+                      re.findall(r"^step \d+ (\d+) (\d+) (\d+)$", said, re.M)]
         self.codes = [step[0] for step in self.steps]
-        self.end = int(re.search(r"^finalize (\d+)", process.stdout, re.M).group(1))
+        self.end = int(re.search(r"^finalize (\d+)", said, re.M).group(1))
         assert len(self.codes) == steps, self.codes
         assert not self.left_behind(), self.left_behind()
 
     def left_behind(self):
         """Processes of the run that are still there some seconds after it."""
         for _ in range(100):
-            left = [path for path in glob.glob("/proc/[0-9]*/environ") if self.is_of_run(path)]
+            left = [path for path in glob.glob("/proc/[0-9]*/environ") if is_of_run(path, self.name)]
             if not left:
                 return []
             time.sleep(0.1)
         return left
-
-    def is_of_run(self, path):
-        try:
-            with open(path, "rb") as file:
-                return b"VDI_TEST_RUN=" + self.name.encode() in file.read()
-        except OSError:
-            return False
 
 
 def dying(stage, how="kill", rank=LAST, **environment):
@@ -256,13 +285,65 @@ def ended():
     run = Run.__new__(Run)
     run.name = name
     for path in glob.glob("/proc/[0-9]*/environ"):
-        if run.is_of_run(path) and "vdi_catalyst_process" not in os.readlink(os.path.dirname(path) + "/exe"):
+        if is_of_run(path, name) and "vdi_catalyst_process" not in os.readlink(os.path.dirname(path) + "/exe"):
             if os.path.basename(os.readlink(os.path.dirname(path) + "/exe")) == os.path.basename(simulation[-1]):
                 os.kill(int(path.split("/")[2]), 9)
     process.wait(timeout=30)
     assert not run.left_behind(), run.left_behind()
 
 
+def until_gone(file):
+    """Waits until a worker has removed the file, which it does in a frame."""
+    end = time.monotonic() + PATIENCE
+    while os.path.exists(file):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def signals():
+    """A batch system's signals to workers, supervisors and launcher, within a frame and after it, do nothing."""
+    step_signals = [signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2, signal.SIGALRM,
+                    signal.SIGTERM, signal.SIGXCPU, signal.SIGTSTP]
+
+    def send(name):
+        until_gone("once")
+        for _ in range(5):
+            found = apart(name)
+            assert len(found["work"]) == len(found["serve"]) == RANKS and len(found["launcher"]) == (RANKS > 1), found
+            for number in step_signals:
+                for process in found["work"] + found["serve"]:
+                    os.kill(process, number)
+                for process in found["launcher"] if number != signal.SIGHUP else []:
+                    os.kill(process, number)
+            time.sleep(0.2)
+
+    open("once", "w").close()
+    run = Run({}, 12, send, VDI_TEST_PAUSE="300", **dying("writing", "sleep", 0, VDI_TEST_DIE_ONCE=os.path.abspath("once")))
+    assert not run.lines and set(run.codes) == {0} and run.end == 0, (run.lines, run.codes)
+    assert len(made()) == 12, made()
+
+
+def supervisor():
+    """If the supervisor is killed, and the worker with it, the message says so."""
+    def send(name):
+        until_gone("once")
+        os.kill(apart(name)["serve"][0], signal.SIGKILL)
+
+    open("once", "w").close()
+    run = Run({}, 8, send, VDI_TEST_PAUSE="300", **dying("writing", "sleep", 0, VDI_TEST_DIE_ONCE=os.path.abspath("once")))
+    one_line(run, r"the process that makes frames was killed together with the one that supervises it, .*; no more frames")
+    assert ENGINE in run.codes or run.end == ENGINE, run.codes
+
+
+def script():
+    """The programs and children that a script starts take signals as usual. If it ends the process, that costs one line."""
+    run = Run(os.path.join(HERE, "isolation_script.py"), 5, VDI_TEST_PAUSE="300", VDI_ISOLATION="process")
+    one_line(run, "rank 0: the process that makes frames ended with exit status 7 while it made the frame of step 2; no more")
+    assert open("children").read() == "[-15, -15, 15]", open("children").read()
+    assert ENGINE in run.codes or run.end == ENGINE, run.codes
+
+
+HERE = os.path.dirname(os.path.abspath(__file__))
 with tempfile.TemporaryDirectory() as folder:
     os.chdir(folder)
     globals()[case]()

@@ -1,9 +1,11 @@
 #include "catalyst_adaptor/isolated/process/Worker.h"
 
 #include <mpi.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <exception>
@@ -21,6 +23,7 @@
 #include "catalyst_adaptor/isolated/Messages.h"
 #include "catalyst_adaptor/isolated/SharedPages.h"
 #include "catalyst_adaptor/isolated/StepData.h"
+#include "catalyst_adaptor/isolated/StepSignals.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
 #include "vdi/comm/Communicator.h"
 
@@ -66,6 +69,27 @@ std::vector<StepData::Array> unpackArrays(Unpacker unpacker) {
     for (double& offset : array.offset) offset = unpacker.take<double>();
   }
   return arrays;
+}
+
+const pid_t self = getpid();
+
+/// Does nothing in this process. In a child that a script forks, such as one of Python's multiprocessing, the
+/// signal acts as usual.
+extern "C" void disregard(int number) {
+  if (getpid() == self) return;
+  std::signal(number, SIG_DFL);
+  raise(number);
+}
+
+/// Disregards the signals by a handler, because programs that a script starts would inherit that they are
+/// ignored or blocked.
+void disregardStepSignals() {
+  struct sigaction action {};
+  action.sa_handler = disregard;
+  action.sa_flags = SA_RESTART;
+  for (const int number : stepSignals) sigaction(number, &action, nullptr);
+  const sigset_t unblocked = setOfStepSignals();
+  sigprocmask(SIG_UNBLOCK, &unblocked, nullptr);
 }
 
 class Worker {
@@ -337,6 +361,7 @@ class Worker {
 }  // namespace
 
 int work(Socket socket, Descriptor setup) {
+  disregardStepSignals();
   const SharedPages pages(std::move(setup));
   Unpacker unpacker(pages.bytes());
   const Setup run = Setup::unpack(unpacker);

@@ -27,6 +27,7 @@
 #include "catalyst_adaptor/isolated/Messages.h"
 #include "catalyst_adaptor/isolated/SharedPages.h"
 #include "catalyst_adaptor/isolated/Socket.h"
+#include "catalyst_adaptor/isolated/StepSignals.h"
 #include "catalyst_adaptor/isolated/process/Worker.h"
 
 namespace {
@@ -118,9 +119,9 @@ std::string ownFile() {
 void work(const Setup& setup, const Socket& socket, const Socket::Received& greeting, pid_t supervisor) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != supervisor) return;
-  sigset_t none;
-  sigemptyset(&none);
-  sigprocmask(SIG_SETMASK, &none, nullptr);
+  // The new program takes no notice of these signals only once it has begun.
+  const sigset_t blocked = vdi::catalyst::setOfStepSignals();
+  sigprocmask(SIG_SETMASK, &blocked, nullptr);
   const int pages = greeting.descriptors[2].number();
   for (const int kept : {socket.number(), pages}) fcntl(kept, F_SETFD, 0);
   fcntl(life, F_SETFD, FD_CLOEXEC);
@@ -139,6 +140,8 @@ void work(const Setup& setup, const Socket& socket, const Socket::Received& gree
 }
 
 int serve(const std::string& name, int ranks) {
+  const sigset_t stepSignals = vdi::catalyst::setOfStepSignals();
+  sigprocmask(SIG_BLOCK, &stepSignals, nullptr);
   sigset_t children;
   sigemptyset(&children);
   sigaddset(&children, SIGCHLD);
