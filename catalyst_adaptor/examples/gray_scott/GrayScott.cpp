@@ -8,8 +8,9 @@
 #include <string>
 #include <vector>
 
+#include <vdi_catalyst.h>
+
 #include "Simulation.h"
-#include "catalyst_adaptor/vdi_catalyst.h"
 
 namespace {
 

@@ -13,7 +13,7 @@
 #include <memory>
 #include <vector>
 
-#include "catalyst_adaptor/vdi_catalyst.h"
+#include <vdi_catalyst.h>
 
 namespace {
 

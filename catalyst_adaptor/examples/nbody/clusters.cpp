@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "catalyst_adaptor/vdi_catalyst.h"
+#include <vdi_catalyst.h>
 
 namespace {
 

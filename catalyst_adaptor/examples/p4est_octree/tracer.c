@@ -12,7 +12,7 @@
 #include <p8est_iterate.h>
 #include <stdlib.h>
 
-#include "catalyst_adaptor/vdi_catalyst.h"
+#include <vdi_catalyst.h>
 
 enum { STEPS = 40, COARSEST = 2, ADAPT = 4 };
 

@@ -10,7 +10,7 @@
 #include <math.h>
 #include <petscdmda.h>
 
-#include "catalyst_adaptor/vdi_catalyst.h"
+#include <vdi_catalyst.h>
 
 enum { STEPS = 600 };
 
