@@ -42,6 +42,8 @@ def recipe(name, runs):
         @functools.wraps(function)
         def test(text):
             assert text == recipe_text, "the page has more than the file"
+            # Without a range, a restarted run would have that of its own first frame.
+            assert not name.endswith(".json") or "range" in json.loads(text).get("colors", {}), "no range of colours"
             os.chdir(runs(name))
             function()
         return function
