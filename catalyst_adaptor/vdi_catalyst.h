@@ -119,6 +119,8 @@ typedef struct vdi_catalyst vdi_catalyst;
  * plugin: those that ParaView saves work as they are. They find its path in os.environ["VDI_PLUGIN"]: the
  * value of that environment variable or, unless it is set, the plugin of this installation.
  *
+ * Without scripts (count 0) it succeeds, and the first rank prints that no step will make anything.
+ *
  * This returns VDI_CATALYST_SCRIPT if a script is missing or isn't Python, and if a script loads another
  * plugin (LoadPlugin at its top level) that is missing. After a failure *catalyst is null, and the other
  * functions, given null, only return VDI_CATALYST_BAD_ARGUMENT. The process may try again on the same ranks

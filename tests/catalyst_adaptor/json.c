@@ -6,15 +6,20 @@
  * VDI_TEST_FULL: the name of an output for which there is no room. VDI_TEST_FIRST: the first step's number.
  * VDI_TEST_WANTS: for each step whether it is wanted, such as 1010; others aren't handed over.
  * VDI_TEST_OWN_TIMES=1: each rank gives a step another time. VDI_TEST_PAUSE: milliseconds between steps.
- * VDI_TEST_LIMIT: the bytes beyond which no file can grow while the third step is executed. VDI_ISOLATION:
- * frames are made in processes of their own. */
+ * VDI_TEST_ALARM=1: SIGALRM interrupts each rank every millisecond, and its handler restarts no call.
+ * VDI_TEST_STOP=MILLISECONDS: the last rank is stopped for so long within each step. VDI_TEST_LIMIT: the
+ * bytes beyond which no file can grow while the third step is executed. VDI_ISOLATION: frames are made in
+ * processes of their own. */
 #include <math.h>
 #include <mpi.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/time.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "catalyst_adaptor/vdi_catalyst.h"
@@ -46,6 +51,33 @@ static void simulate(int first, int count, int step) {
       }
     }
   }
+}
+
+static volatile sig_atomic_t alarms;
+
+static void count_alarm(int number) {
+  (void)number;
+  ++alarms;
+}
+
+static void begin_alarms(void) {
+  struct sigaction action;
+  memset(&action, 0, sizeof action);
+  action.sa_handler = count_alarm;
+  sigaction(SIGALRM, &action, NULL);
+  const struct itimerval often = {{0, 1000}, {0, 1000}};
+  setitimer(ITIMER_REAL, &often, NULL);
+}
+
+/* A child stops this process soon, and lets it go on after some milliseconds. */
+static pid_t stop_soon(int milliseconds) {
+  const pid_t child = fork();
+  if (child != 0) return child;
+  usleep(5000);
+  kill(getppid(), SIGSTOP);
+  usleep((useconds_t)milliseconds * 1000);
+  kill(getppid(), SIGCONT);
+  _exit(0);
 }
 
 static int refuse(int rank, const char* json, int wanted) {
@@ -137,8 +169,10 @@ int main(int argc, char** argv) {
   const char* pause = getenv("VDI_TEST_PAUSE");
   const double late = getenv("VDI_TEST_OWN_TIMES") != NULL ? 0.01 * rank : 0.0;
   const char* bytes = getenv("VDI_TEST_LIMIT");
+  const char* stop = getenv("VDI_TEST_STOP");
   struct rlimit limit;
   getrlimit(RLIMIT_FSIZE, &limit);
+  if (getenv("VDI_TEST_ALARM") != NULL) begin_alarms();
   for (int i = 0; i < argc - 2; ++i) {
     const int step = i + (first_step != NULL ? atoi(first_step) : 0);
     simulate(first, count, step);
@@ -152,7 +186,9 @@ int main(int argc, char** argv) {
       const struct rlimit tight = {(rlim_t)atoi(bytes), limit.rlim_max};
       setrlimit(RLIMIT_FSIZE, &tight);
     }
+    const pid_t stopping = stop != NULL && rank == ranks - 1 ? stop_soon(atoi(stop)) : 0;
     const int code = vdi_catalyst_execute(catalyst, step, 0.5 * step - late);
+    if (stopping > 0) waitpid(stopping, NULL, 0);
     setrlimit(RLIMIT_FSIZE, &limit);
     wrong += expect_step(rank, atoi(argv[i + 2]), code);
     if (code != VDI_CATALYST_OK)
@@ -168,6 +204,9 @@ int main(int argc, char** argv) {
   wrong += expect(rank, "its text", 1,
                   strstr(vdi_catalyst_error(catalyst), "the time isn't a finite number") != NULL);
   wrong += expect_end(rank, vdi_catalyst_finalize(catalyst));
+  const struct itimerval never = {{0, 0}, {0, 0}};
+  setitimer(ITIMER_REAL, &never, NULL);
+  if (getenv("VDI_TEST_ALARM") != NULL) wrong += expect(rank, "alarms", 1, alarms > 0);
   wrong += expect(rank, "a second finalize", VDI_CATALYST_BAD_ARGUMENT, vdi_catalyst_finalize(catalyst));
   wrong += expect(rank, "a step is wanted after it", 0, vdi_catalyst_wants(catalyst, 0, 0.0));
   return end(wrong);

@@ -1,5 +1,5 @@
-"""Runs without a script in a folder each: existing files, triggers, cameras, budgets, a disk that is full. Arguments: the
-case, vdi, and the simulation with its launcher."""
+"""Runs without a script in a folder each: existing files, triggers, cameras, budgets, a disk that is full, signals. A case
+that the environment refuses is skipped: exit status 77. Arguments: the case, vdi, and the simulation with its launcher."""
 
 import csv
 import json
@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import time
 
 case, tool, *simulation = sys.argv[1:]
 SMALL = {"field": "V", "resolution": [40, 30]}
@@ -241,6 +242,44 @@ def lost_device():
     assert not os.path.exists("none"), "each rank got another device"
     for name in "ab":
         assert open("one_1_%s.vdi" % name, "rb").read() == open("three_1_%s.vdi" % name, "rb").read()
+
+
+def same_frames(start, other):
+    for step in range(3):
+        assert open("%s_%d.vdi" % (start, step), "rb").read() == open("%s_%d.vdi" % (other, step), "rb").read(), step
+
+
+def alarms():
+    """Calls that a timer interrupts are made again."""
+    for start, alarm in (("calm", {}), ("often", {"VDI_TEST_ALARM": "1"})):
+        run({"output": start + "_{timestep}.vdi", "log": start + ".jsonl"}, 0, 0, 0, **alarm)
+    same_frames("calm", "often")
+    logged = [event["event"] for event in events("often.jsonl")]
+    assert logged == ["start", "frame", "frame", "frame", "end"], logged
+
+
+def paused():
+    """If one rank is stopped within its frame, the others wait for it."""
+    begin = time.monotonic()
+    run({"output": "on_{timestep}.vdi"}, 0, 0, 0)
+    free = time.monotonic() - begin
+    run({"output": "off_{timestep}.vdi"}, 0, 0, 0, VDI_TEST_STOP="500")
+    assert time.monotonic() - begin - free > 1.5
+    same_frames("on", "off")
+
+
+def no_shm():
+    """Where ranks of a host can share no memory through /dev/shm, they send messages."""
+    if subprocess.run(["unshare", "--mount", "mount", "-t", "tmpfs", "tmpfs", "/dev/shm"]).returncode != 0:
+        print("skipped: this environment refuses namespaces (CAP_SYS_ADMIN)")
+        sys.exit(77)
+    large = {"resolution": [320, 240]}
+    run({**large, "output": "free_{timestep}.vdi"}, 0, 0, 0)
+    script = 'mount -t tmpfs -o size=64k tmpfs /dev/shm && head -c 64k /dev/zero > /dev/shm/full; exec "$@"'
+    simulation[:0] = ["unshare", "--mount", "sh", "-c", script, "sh"]
+    # Open MPI's own messages between the ranks of a host need memory, too.
+    run({**large, "output": "full_{timestep}.vdi"}, 0, 0, 0, OMPI_MCA_btl_vader_backing_directory=os.getcwd())
+    same_frames("free", "full")
 
 
 with tempfile.TemporaryDirectory() as folder:

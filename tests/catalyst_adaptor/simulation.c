@@ -1,6 +1,6 @@
-/* A simulation in C: one block of 8-bit point data per rank, along x. Arguments: the script, then the code
- * that each step must return, or CODE*STEPS. Exit status 0 if all did and each failure had a text.
- * Environment: VDI_TEST_INITIALIZE=CODE: initialize returns that, and nothing else happens, unless
+/* A simulation in C: one block of 8-bit point data per rank, along x. Arguments: the script, or "-" for none,
+ * then the code that each step must return, or CODE*STEPS. Exit status 0 if all did and each failure had a
+ * text. Environment: VDI_TEST_INITIALIZE=CODE: initialize returns that, and nothing else happens, unless
  * VDI_TEST_THEN=SCRIPT: initialize with that script succeeds and is finalized.
  * VDI_TEST_WANTS=1010: what vdi_catalyst_wants says before each step.
  * VDI_TEST_LATE=1: finalize is called after MPI_Finalize.
@@ -147,8 +147,10 @@ int main(int argc, char** argv) {
   }
   wrong += expect(rank, "initialize with a wrong handle", VDI_CATALYST_BAD_ARGUMENT,
                   vdi_catalyst_initialize(12345, 1, scripts, &catalyst));
-  wrong += expect(rank, "initialize", VDI_CATALYST_OK,
-                  vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), 1, scripts, &catalyst));
+  const int count = strcmp(argv[1], "-") == 0 ? 0 : 1;
+  wrong += expect(
+      rank, "initialize", VDI_CATALYST_OK,
+      vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), count, count > 0 ? scripts : NULL, &catalyst));
   vdi_catalyst* second = NULL;
   wrong += expect(rank, "a second initialize", VDI_CATALYST_ENGINE,
                   vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), 1, scripts, &second));
