@@ -118,6 +118,8 @@ print("first frames: %s s; device memory: %s MiB"
       % (" ".join("%.2f" % s for s in seconds), " ".join("%.1f" % m.max() for m in memory)))
 check((memory[1] - memory[0] <= 0.1 * memory[0]).all(), "a second camera takes a tenth of the first one's memory at most")
 check((memory[2] - memory[0] <= 0.1 * memory[0]).all(), "with a third camera, the additional memory is still a tenth at most")
+# Measured shares are 1 to 22 %; the rest is room for busy machines. ParaView's min, which is collective, hides Python's.
+check(np.min(seconds[1:]) <= 0.5 * seconds[0], "another camera's first frame takes half as long as the first one's at most")
 first, second, third = images
 
 # Another camera, another array.
