@@ -307,11 +307,13 @@ export class Page {
 
   /** @param {boolean} on */
   play(on) {
+    const wasPlaying = this.isPlaying;
     this.isPlaying = on;
     ++this.plays;
     element("play").textContent = on ? "Pause" : "Play";
     element("play").setAttribute("aria-pressed", String(on));
     if (on) this.playOn();
+    else if (wasPlaying) this.keepInUrl();
   }
 
   async playOn() {
@@ -400,8 +402,10 @@ export class Page {
     if (camera !== cameraText(vdi.camera)) parts.push(`camera=${camera}`);
     const isChosen = this.source ? this.frame > 0 : this.live?.isChosen();
     if (isChosen) parts.push(`frame=${this.frame}`);
+    const hash = parts.length > 0 ? `#${parts.join("&")}` : "";
+    if (hash === location.hash) return;
     try {
-      history.replaceState(history.state, "", parts.length > 0 ? `#${parts.join("&")}` : location.pathname + location.search);
+      history.replaceState(history.state, "", hash || location.pathname + location.search);
     } catch {
       // Some browsers allow this only a few times per second. A later view will succeed.
     }

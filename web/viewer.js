@@ -1,6 +1,9 @@
 // Schedules drawing. While the view moves, a picture has as many pixels as the frame rate allows.
-// At rest the whole picture is drawn in strips, so that a new motion never waits for it.
+// At rest the whole picture is drawn in strips, so that a new motion never waits for it. A VDI that
+// replaces another at rest is drawn in strips, too, and with as many pixels as its time on show
+// allows. The former VDI's picture stays meanwhile.
 
+import {cameraText} from "./camera.js";
 import {politely} from "./decoder.js";
 import {Renderer} from "./renderer.js";
 
@@ -13,6 +16,8 @@ const FRAME_MS = 33;       // time for a picture in motion
 const STRIP_MS = 40;       // time for a strip of a picture at rest
 const REST_MS = 150;       // the view rests after this time without motion
 const LEAN_MS = 300;       // a VDI on show for this time is worth a sheared picture
+const LATE_MS = 400;       // at rest, a VDI waits for this time at most until its picture replaces the former one
+const PACE_SHARE = 0.6;    // share of a VDI's time on show in which its first picture at rest is drawn
 const LARGEST_SCALE = 8;
 
 export class Viewer {
@@ -48,10 +53,23 @@ export class Viewer {
      */
     this.missing = "nothing";
     this.nextRow = 0;
+    /** Canvas pixels per pixel of the strips, each way. */
+    this.detailScale = 1;
+    /**
+     * The time since which the picture on show is a former VDI's. It is undefined while the picture
+     * is the present VDI's.
+     * @type {number | undefined}
+     */
+    this.outdatedAt = undefined;
+    /** Milliseconds for which the former VDI, and the one before, were on show. */
+    this.stays = [Infinity, Infinity];
     /** @type {{sync: WebGLSync, since: number, pixels: number} | undefined} */
     this.pending = undefined;
     this.isScheduled = false;
-    /** Called after each whole picture of a view at rest. */
+    /**
+     * Called once the camera has rested for REST_MS: after each motion, after a jump, and for each
+     * VDI that comes at rest. Pictures may be incomplete.
+     */
     this.onRest = () => {};
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.restTimer = undefined;
@@ -82,10 +100,22 @@ export class Viewer {
   async setVdi(vdi, isWanted) {
     const isShown = await this.renderer.setVdi(vdi, politely(), isWanted);
     if (isShown) {
-      this.shownAt = performance.now();
-      this.redraw();
+      const now = performance.now();
+      this.stays = [now - this.shownAt, this.stays[0]];
+      this.shownAt = now;
+      this.renew();
+      this.awaitRest();
     }
     return isShown;
+  }
+
+  /** Draws the picture of a new VDI. At rest, the former picture stays until the new one is detailed. */
+  renew() {
+    const now = performance.now();
+    this.outdatedAt ??= now;
+    if (!this.isResting() || this.missing === "all" || now - this.outdatedAt > LATE_MS) return this.redraw();
+    [this.missing, this.nextRow] = ["detail", 0];
+    this.schedule();
   }
 
   /** @param {boolean} smooth */
@@ -96,9 +126,16 @@ export class Viewer {
 
   /** @param {Camera} camera @param {boolean} [moving] whether further cameras will follow */
   setCamera(camera, moving = true) {
+    const isSame = !moving && this.camera !== undefined && cameraText(camera) === cameraText(this.camera);
     this.camera = camera;
     if (moving) this.movedAt = performance.now();
-    this.redraw();
+    this.awaitRest();
+    if (!isSame) this.redraw();
+  }
+
+  /** Whether the camera has rested for REST_MS, or has jumped. */
+  isResting() {
+    return performance.now() - this.movedAt >= REST_MS;
   }
 
   /** Redraws the picture. */
@@ -165,7 +202,7 @@ export class Viewer {
       return;
     }
     if (this.fitCanvas()) this.missing = "all";
-    const isResting = performance.now() - this.movedAt > REST_MS;
+    const isResting = this.isResting();
     if (this.missing === "all") this.drawWhole(isResting);
     else if (this.missing === "detail" && isResting) this.drawStrip();
     else if (this.awaitsLeaning()) void this.askLeaning(isResting);
@@ -199,10 +236,9 @@ export class Viewer {
 
   /** @param {boolean} isResting */
   drawWhole(isResting) {
-    const {renderer, canvas} = this;
+    const {renderer} = this;
     if (!this.camera) return;
-    const all = canvas.width * canvas.height * this.cost;
-    const scale = all <= FRAME_MS ? 1 : Math.min(Math.ceil(Math.sqrt(all / FRAME_MS) * 4) / 4, LARGEST_SCALE);
+    const scale = this.scaleFor(FRAME_MS);
     const {width, height} = renderer.pictureSize(scale);
     const sheared = isResting && scale === 1 && renderer.canShear();
     renderer.drawPicture(this.camera, scale, 0, height, sheared);
@@ -210,31 +246,53 @@ export class Viewer {
     this.refresh();
     this.watch(width * height);
     this.nextRow = 0;
+    this.outdatedAt = undefined;
     this.missing = scale > 1 || (renderer.canShear() && !sheared) ? "detail" : "nothing";
-    if (this.missing === "nothing") this.awaitRest();
   }
 
-  /** Calls onRest once the view has rested for REST_MS, however many pictures ask for that meanwhile. */
+  /** Calls onRest later, once the camera has rested. Further calls until then change nothing. */
   awaitRest() {
     clearTimeout(this.restTimer);
-    const left = REST_MS - (performance.now() - this.movedAt);
-    if (left > 0) this.restTimer = setTimeout(() => this.awaitRest(), left);
-    else this.onRest();
+    this.restTimer = setTimeout(() => this.onRest(), Math.max(REST_MS - (performance.now() - this.movedAt), 0));
+  }
+
+  /**
+   * The finest scale at which a whole picture takes this time or less.
+   * @param {number} milliseconds
+   */
+  scaleFor(milliseconds) {
+    const all = this.canvas.width * this.canvas.height * this.cost;
+    return all <= milliseconds ? 1 : Math.min(Math.ceil(Math.sqrt(all / milliseconds) * 4) / 4, LARGEST_SCALE);
+  }
+
+  /**
+   * The scale of strips that begin now. A VDI that has no picture yet gets one that is complete
+   * before the next VDI comes. Levels of a frame come in quick succession, and so the longer one of
+   * two stays counts.
+   */
+  stripScale() {
+    if (this.outdatedAt === undefined) return 1;
+    return this.scaleFor(Math.max(Math.min(PACE_SHARE * Math.max(...this.stays), LATE_MS), FRAME_MS));
   }
 
   drawStrip() {
-    const {renderer, canvas} = this;
+    const {renderer} = this;
     if (!this.camera) return;
-    const rows = Math.max(8, Math.floor(STRIP_MS / (this.cost * canvas.width)));
-    const end = Math.min(this.nextRow + rows, canvas.height);
-    renderer.drawPicture(this.camera, 1, this.nextRow, end, renderer.canShear());
-    this.watch(canvas.width * (end - this.nextRow));
+    if (this.nextRow === 0) this.detailScale = this.stripScale();
+    const {width, height} = renderer.pictureSize(this.detailScale);
+    const most = Math.max(8, Math.floor(STRIP_MS / (this.cost * width)));
+    const left = height - this.nextRow;
+    const rows = Math.ceil(left / Math.ceil(left / most));  // equal strips: a small one would seem slow for its size
+    const end = this.nextRow + rows;
+    renderer.drawPicture(this.camera, this.detailScale, this.nextRow, end, renderer.canShear());
+    this.watch(width * (end - this.nextRow));
     this.nextRow = end;
-    if (end < canvas.height) return;
+    if (end < height) return;
     renderer.finishPicture();
     this.refresh();
-    this.missing = "nothing";
-    this.awaitRest();
+    this.nextRow = 0;
+    this.outdatedAt = undefined;
+    if (this.detailScale === 1) this.missing = "nothing";
   }
 
   /** Whether the picture on show is whole. */
@@ -260,8 +318,8 @@ export class Viewer {
     this.refresh();
     // Otherwise strips would go on in the former picture, without redrawing its first rows.
     this.nextRow = 0;
+    this.outdatedAt = undefined;
     this.missing = "nothing";
-    this.awaitRest();
     return new Promise((resolve, reject) => {
       canvas.toBlob((blob) => blob ? resolve(blob) : reject(new Error("the browser can't save the picture as PNG")), "image/png");
     });

@@ -71,6 +71,8 @@ function viewerOf(/** @type {number} */ millisecondsPerPixel) {
       fenceSync: () => ({at: clock.now + drawn * millisecondsPerPixel}),
       clientWaitSync: (/** @type {{at: number}} */ sync) => clock.now < sync.at ? 1 : 0,
     },
+    frame: 0,
+    setVdi: async (/** @type {any} */ _, /** @type {any} */ pause, /** @type {() => boolean} */ isWanted) => isWanted(),
     loaded: undefined, smooth: false, canShear: () => false, shown: blank(), next: blank(),
     pictureSize: (/** @type {number} */ scale) => ({width: Math.ceil(side / scale), height: Math.ceil(side / scale)}),
     /** @param {any} camera @param {number} scale @param {number} first @param {number} end */
@@ -115,6 +117,53 @@ function testRest() {
   check(slow.rests() === 0, `a slow view that moves doesn't rest: ${slow.rests()} times`);
   clock.pass(2000);
   check(slow.viewer.isWhole() && slow.rests() === 1, `a slow view rests, too: ${slow.rests()} times`);
+}
+
+/**
+ * A hand that rests while VDIs come: the page calls it at rest, and each VDI is seen as finely as
+ * its time on show allows.
+ */
+async function testRestWithFrames() {
+  const seenOf = async (/** @type {number} */ millisecondsPerPixel, /** @type {number[]} */ pauses) => {
+    const {viewer, renderer, look, rests} = viewerOf(millisecondsPerPixel);
+    /** @type {string[][]} scales at which each VDI is seen */
+    const seen = [];
+    const finish = renderer.finishPicture;
+    renderer.finishPicture = () => {
+      finish.call(renderer);
+      seen[renderer.frame].push(renderer.shown[0].split(" at ")[1]);
+    };
+    await viewer.setVdi(/** @type {any} */ ({}), () => true);
+    seen.push([]);
+    for (let x = 0; x < 10; ++x) {
+      look(x, true);
+      clock.pass(16);
+    }
+    let rested = rests();
+    for (let i = 0; i < 20; ++i) {
+      clock.pass(pauses[i % pauses.length]);
+      seen.push([]);
+      renderer.frame = seen.length - 1;
+      await viewer.setVdi(/** @type {any} */ ({}), () => true);
+      if (i === 0) rested = rests();
+    }
+    return {seen: seen.slice(4), rested};
+  };
+  const slow = await seenOf(0.1, [500]);  // a whole picture takes a second
+  check(slow.rested === 1, `a view rests although no picture is complete: ${slow.rested}`);
+  const coarsest = (/** @type {string[][]} */ seen) => Math.max(...seen.slice(0, -1).flat().map(Number));
+  check(slow.seen.slice(0, -1).every((scales) => scales.length > 0) && coarsest(slow.seen) <= 2.5,
+        `frames that come twice a second are seen about as finely as the time allows: ${JSON.stringify(slow.seen)}`);
+  const sharp = await seenOf(0.02, [500]);
+  check(sharp.seen.slice(0, -1).every((scales) => scales.join() === "1"),
+        `frames are seen sharp from the start if time allows: ${JSON.stringify(sharp.seen)}`);
+  const quick = await seenOf(0.1, [100]);
+  check(quick.seen.flat().length >= 10 && coarsest(quick.seen) <= 6, `most of ten frames a second are seen: ${JSON.stringify(quick.seen)}`);
+  const levels = await seenOf(0.02, [450, 50]);
+  check(levels.seen.filter((scales) => scales.join() === "1").length >= 8 && coarsest(levels.seen) === 1,
+        `of two levels in quick succession, the finer one is seen sharp: ${JSON.stringify(levels.seen)}`);
+  const irregular = await seenOf(0.02, [400, 150, 150, 150]);
+  check(irregular.seen.flat().length >= 12, `frames that come earlier than expected are seen, too: ${JSON.stringify(irregular.seen)}`);
 }
 
 async function testScreenshot() {
@@ -478,6 +527,7 @@ async function testWrongFile() {
 }
 
 testRest();
+await testRestWithFrames();
 await testScreenshot();
 testRoll();
 testPan();
