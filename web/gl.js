@@ -40,6 +40,18 @@ export function makeProgram(gl, vertex, fragment) {
 }
 
 /**
+ * The largest width and height of a picture that the GPU draws to a texture or to the canvas. They
+ * are 1 while the context is lost.
+ * @param {WebGL2RenderingContext} gl
+ * @returns {[number, number]}
+ */
+export function largestPicture(gl) {
+  const side = Math.min(gl.getParameter(gl.MAX_TEXTURE_SIZE), gl.getParameter(gl.MAX_RENDERBUFFER_SIZE));
+  const viewport = gl.getParameter(gl.MAX_VIEWPORT_DIMS) ?? [1, 1];
+  return [Math.max(Math.min(side, viewport[0]), 1), Math.max(Math.min(side, viewport[1]), 1)];
+}
+
+/**
  * The layout of long arrays in textures; see Variant in traverse.js.
  * @param {WebGL2RenderingContext} gl
  */

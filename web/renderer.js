@@ -3,7 +3,7 @@
 
 import {basisOf, clipMatrix, pixelSizeOf, raysOf} from "./camera.js";
 import {REGION, cullShader} from "./cull.js";
-import {makeArrayTexture, makeProgram, tilingOf} from "./gl.js";
+import {largestPicture, makeArrayTexture, makeProgram, tilingOf} from "./gl.js";
 import {WHOLE_PICTURE, traverseShader} from "./traverse.js";
 
 /** @typedef {import("./format.js").Camera} Camera */
@@ -129,7 +129,7 @@ function makePicture(gl, filter) {
 
 export class Renderer {
   /**
-   * Throws Error without WebGL2. The owner of the canvas sets its size in pixels.
+   * Throws Error without WebGL2. The owner of the canvas sets its size in pixels, `most` at most.
    * @param {HTMLCanvasElement} canvas
    */
   constructor(canvas) {
@@ -142,6 +142,8 @@ export class Renderer {
     this.smooth = true;
     /** Counts contexts. Objects of former contexts are gone. */
     this.age = 0;
+    /** The largest width and height of the canvas. @type {[number, number]} */
+    this.most = [1, 1];
     this.restore();
   }
 
@@ -149,6 +151,7 @@ export class Renderer {
   restore() {
     const gl = this.gl;
     ++this.age;
+    this.most = largestPicture(gl);
     /** @type {Map<string, ReturnType<typeof makeProgram>>} programs that render VDIs, by variant */
     this.programs = new Map();
     this.copy = makeProgram(gl, WHOLE_PICTURE, COPY);

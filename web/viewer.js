@@ -160,13 +160,16 @@ export class Viewer {
   }
 
   /**
-   * Gives the canvas the screen's number of pixels.
+   * Gives the canvas the screen's number of pixels, or as many as the GPU allows. The browser
+   * stretches a smaller canvas.
    * @returns {boolean} whether the number changed
    */
   fitCanvas() {
-    const ratio = Math.min(window.devicePixelRatio || 1, 2);
-    const width = Math.max(1, Math.round(this.canvas.clientWidth * ratio));
-    const height = Math.max(1, Math.round(this.canvas.clientHeight * ratio));
+    const {clientWidth, clientHeight} = this.canvas;
+    const [mostWidth, mostHeight] = this.renderer.most;
+    const ratio = Math.min(window.devicePixelRatio || 1, 2, mostWidth / Math.max(clientWidth, 1), mostHeight / Math.max(clientHeight, 1));
+    const width = Math.max(1, Math.round(clientWidth * ratio));
+    const height = Math.max(1, Math.round(clientHeight * ratio));
     if (this.canvas.width === width && this.canvas.height === height) return false;
     this.canvas.width = width;
     this.canvas.height = height;

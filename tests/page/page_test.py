@@ -11,8 +11,8 @@ import sys
 import numpy as np
 from skimage import io as images
 
-from pagetest import (HEIGHT, PICTURES, VDI, WIDTH, azimuth, bare, camera_of, check, compare, message_of, open_page, page_of,
-                      rendered, rendering, run, shown, vdi, whole)
+from pagetest import (HEIGHT, PICTURES, VDI, WIDTH, azimuth, bare, camera_of, check, compare, failures, final, message_of, open_page,
+                      page_of, rendered, rendering, run, shown, vdi, whole)
 
 
 def test_pictures(browser):
@@ -40,19 +40,58 @@ def test_pictures(browser):
         check(not browser.complaints(), f"{name}: {browser.complaints()}")
 
 
+SMALL = """
+(() => {
+  const most = 64, {prototype} = WebGL2RenderingContext, {getParameter, getError} = prototype;
+  window.refused = [];  // calls that exceed the limit, which a GPU answers with an error
+  let isWrong = false;
+  prototype.getParameter = function(name) {
+    if (name === this.MAX_TEXTURE_SIZE || name === this.MAX_RENDERBUFFER_SIZE) return most;
+    return name === this.MAX_VIEWPORT_DIMS ? new Int32Array([most, most]) : getParameter.call(this, name);
+  };
+  prototype.getError = function() {
+    const was = isWrong;
+    isWrong = false;
+    return was ? this.INVALID_VALUE : getError.call(this);
+  };
+  const places = {texImage2D: 3, texStorage2D: 3, texImage3D: 3, texStorage3D: 3, renderbufferStorage: 2,
+                  renderbufferStorageMultisample: 3, viewport: 2};
+  for (const [name, place] of Object.entries(places)) {
+    const call = prototype[name];
+    prototype[name] = function(...words) {
+      if (Math.max(words[place], words[place + 1]) <= most) return call.apply(this, words);
+      window.refused.push([name, words[place], words[place + 1]]);
+      isWrong = true;
+    };
+  }
+})();"""
+
+
 def test_small_textures(browser):
-    """A GPU whose textures are 64 texels wide and high: lists and supersegments take several layers."""
-    script = browser.send("Page.addScriptToEvaluateOnNewDocument", source="""
-      const asked = WebGL2RenderingContext.prototype.getParameter;
-      WebGL2RenderingContext.prototype.getParameter = function(name) {
-        return name === this.MAX_TEXTURE_SIZE ? 64 : asked.call(this, name);
-      };""")["identifier"]
+    """A GPU whose textures are 64 texels wide and high: lists and supersegments take several layers, and the picture
+    of a larger window is that of a canvas of 64 pixels."""
+    script = browser.send("Page.addScriptToEvaluateOnNewDocument", source=SMALL)["identifier"]
     open_page(browser, "compact.html")
     whole(browser)
     bare(browser)
     camera = azimuth(camera_of(browser), 30)
     browser.value(f"vdiPage.setCamera({json.dumps(camera)}, false)")
-    compare("small textures", shown(browser), rendered("compact.vdi", camera))
+    final(browser)
+    png = browser.value("vdiPage.viewer.screenshot().then((blob) => new Promise((done) => {"
+                        " const reader = new FileReader(); reader.onload = () => done(reader.result.split(',')[1]);"
+                        " reader.readAsDataURL(blob); }))")
+    got = images.imread(io.BytesIO(base64.b64decode(png)))[..., :3]
+    seen = shown(browser, "small_textures")
+    check(got.shape[:2] == (36, 64) and seen.any(), f"the canvas is as large as the GPU allows: {got.shape}, {seen.max()}")
+    if failures:
+        return
+    compare("small textures", got, rendered("compact.vdi", camera, size=(64, 36)))
+    extents = [[np.ptp(places) for places in np.nonzero(picture.max(axis=2) > 20)] for picture in (got, seen)]
+    check(np.allclose(3 * np.array(extents[0]), extents[1], atol=6), f"the browser stretches the canvas: {extents}")
+    browser.value("vdiPage.setCamera(vdiPage.vdi.camera); vdiPage.viewer.cost = 0.1")  # coarse pictures, then strips
+    final(browser)
+    check(browser.value("refused.length === 0 && vdiPage.viewer.renderer.gl.getError() === 0"),
+          f"the GPU refuses {browser.value('refused')}")
     browser.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
 
 

@@ -74,7 +74,7 @@ def shown(browser, name=None):
     return images.imread(io.BytesIO(browser.screenshot(path)))[..., :3]
 
 
-def rendering(file, camera, reconstruction="sheared"):
+def rendering(file, camera, reconstruction="sheared", size=(WIDTH, HEIGHT)):
     """Starts vdi render of a file from the page's camera. Returns a function that waits for its picture."""
     words = {"position": camera["position"], "focal_point": camera["focalPoint"], "view_up": camera["viewUp"]}
     if camera["parallel"]:
@@ -84,7 +84,7 @@ def rendering(file, camera, reconstruction="sheared"):
     name = f"expected_{next(numbers)}"
     with open(f"{name}.json", "w", encoding="utf-8") as text:
         json.dump(words, text)
-    command = [VDI, "render", file, "-o", f"{name}.png", "--camera", f"{name}.json", "--resolution", f"{WIDTH}x{HEIGHT}",
+    command = [VDI, "render", file, "-o", f"{name}.png", "--camera", f"{name}.json", "--resolution", f"{size[0]}x{size[1]}",
                "--reconstruction", reconstruction]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
@@ -96,9 +96,9 @@ def rendering(file, camera, reconstruction="sheared"):
     return picture
 
 
-def rendered(*words):
+def rendered(*words, **more):
     """The picture that vdi render makes of a file from the page's camera."""
-    return rendering(*words)()
+    return rendering(*words, **more)()
 
 
 def compare(what, got, expected, least=0.995):

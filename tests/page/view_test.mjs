@@ -73,7 +73,7 @@ function viewerOf(/** @type {number} */ millisecondsPerPixel) {
     },
     frame: 0,
     setVdi: async (/** @type {any} */ _, /** @type {any} */ pause, /** @type {() => boolean} */ isWanted) => isWanted(),
-    loaded: undefined, smooth: false, canShear: () => false, shown: blank(), next: blank(),
+    most: [4096, 4096], loaded: undefined, smooth: false, canShear: () => false, shown: blank(), next: blank(),
     pictureSize: (/** @type {number} */ scale) => ({width: Math.ceil(side / scale), height: Math.ceil(side / scale)}),
     /** @param {any} camera @param {number} scale @param {number} first @param {number} end */
     drawPicture(camera, scale, first, end) {
