@@ -370,6 +370,7 @@ export class Live {
     this.isDecoding = true;
     while (this.waiting) {
       const {level, load, done} = this.waiting;
+      const {socket} = this;  // the level's connection, because another one begins without waiting levels
       this.waiting = undefined;
       done?.();
       if (this.holdBack(level, load)) continue;
@@ -383,10 +384,15 @@ export class Live {
           continue;
         }
         this.shown = level;
+        if (socket !== this.socket) {  // the cause of the loss stays
+          this.options.onChange();
+          continue;
+        }
         this.failures = 0;
         this.pauseServer();
         this.change(this.state, "");
       } catch (error) {  // only this level is lost
+        if (socket !== this.socket) continue;
         const cause = error instanceof Error ? error.message : String(error);
         if (level.level + 1 === level.levels) this.miss(level.frame, cause);
         else this.change(this.state, cause);

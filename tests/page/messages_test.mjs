@@ -323,6 +323,24 @@ async function testLateDecoder() {
   live.close();
 }
 
+/** A level that is decoded after its server has gone is shown, and leaves cause and attempts as they are. */
+async function testLateLevel() {
+  for (const byte of [1, 255]) {
+    const {live, sockets, shown} = connection(200);
+    sockets[0].open();
+    sockets[0].text({...welcome, series: null});
+    live.failures = 3;
+    sendLevel(sockets[0], 7, 1, byte);
+    sockets[0].end(1006);
+    const {cause, failures} = live;
+    await settled(live);
+    check(shown.join() === (byte === 1 ? "1" : "") && live.state === "lost", `a level after a loss: ${shown}, ${live.state}`);
+    check(live.cause === cause && cause !== "" && live.failures === failures,
+          `a level that ends after the loss keeps its cause: "${live.cause}", ${live.failures} failures`);
+    live.close();
+  }
+}
+
 async function testSeries() {
   const {live, sockets} = connection();
   live.wanted = 3;
@@ -630,6 +648,7 @@ await testManyFrames();
 await testConnection();
 await testSilence();
 await testLateDecoder();
+await testLateLevel();
 await testSeries();
 await testChosenFrame();
 await testPause();
