@@ -25,6 +25,7 @@ class Server:
         self.address = self.process.stdout.readline().strip()
         self.link = f"{self.address.split('#')[0]}#token={TOKEN}"
         self.port = int(self.address.split(":")[2].split("/")[0])
+        self.origin = self.address.split("#")[0].rstrip("/")
 
     def end(self, how=signal.SIGTERM):
         self.process.send_signal(how)
@@ -141,6 +142,53 @@ def test_tokens(browser):
         browser.value(f"location.hash = 'token={TOKEN}'")
         wait_for_frame(browser, 0)
         check(message_of(browser) == "", "the right token after none")
+
+
+def test_tls(browser):
+    """A page over TLS, whose requests tell nobody the token. The browser is told to trust any certificate."""
+    os.mkdir("secured")
+    make("secured/step_0.vdi", 16, large=False)
+    subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", "key.pem", "-out", "certificate.pem",
+                    "-days", "2", "-subj", "/CN=127.0.0.1", "-addext", "subjectAltName=IP:127.0.0.1"],
+                   check=True, timeout=SECONDS, stderr=subprocess.DEVNULL)
+    browser.send("Security.setIgnoreCertificateErrors", ignore=True)
+    with Server("secured", "--certificate", "certificate.pem", "--key", "key.pem") as server:
+        check(server.link.startswith("https://"), f"a link over TLS: {server.address.split('#')[0]}")
+        browser.open(server.link)
+        wait_for_frame(browser, 0)
+        bare(browser)
+        compare("over TLS", shown(browser), rendered("secured/step_0.vdi", camera_of(browser)))
+        make("secured/step_1.vdi", 17, large=False)
+        wait_for_frame(browser, 1)
+        check(line(browser).startswith("Live"), f"a live page over TLS: {line(browser)}")
+        check_requests(browser, server, "wss://")
+        check(not browser.complaints(), f"over TLS: {browser.complaints()}")
+    browser.send("Security.setIgnoreCertificateErrors", ignore=False)
+
+
+def check_requests(browser, server, scheme):
+    """Checks that a page asks only its server, when it is opened and loaded again, and that no request has the token."""
+    browser.send("Page.reload")
+    browser.wait("window.vdiPage?.vdi && vdiPage.live.live.state === 'live'", SECONDS)
+    urls, headers = set(), []
+    for event in browser.events:
+        method, more = event.get("method"), event.get("params", {})
+        if method == "Network.requestWillBeSent":
+            urls.add(more["request"]["url"])  # without the fragment, which a browser doesn't send
+            headers.append(more["request"]["headers"])
+        elif method == "Network.webSocketCreated":
+            urls.add(more["url"])
+        elif method == "Network.webSocketWillSendHandshakeRequest":
+            headers.append(more["request"]["headers"])
+        elif method == "Network.requestWillBeSentExtraInfo":
+            headers.append(more["headers"])
+    urls = {url for url in urls if not url.startswith(("blob:", "data:", "about:"))}
+    expected = {server.origin + "/", scheme + server.origin.split("://")[1] + "/stream"}
+    check(urls == expected, f"the page asks only its server: {urls}")
+    names = {name.lower() for one in headers for name in one}
+    check("sec-websocket-key" in names and len(headers) >= 3, f"requests with their headers: {len(headers)}, {names}")
+    check(TOKEN not in json.dumps([sorted(urls), headers]), "no request has the token in its URL or in a header")
+    check("referer" not in names, "no request says where it comes from")
 
 
 def test_pages(browser):
@@ -295,4 +343,4 @@ def test_steering(browser):
     browser.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
 
 
-run(test_frames, test_size, test_tokens, test_pages, test_series, test_missing_frame, test_steering)
+run(test_frames, test_size, test_tokens, test_tls, test_pages, test_series, test_missing_frame, test_steering)
