@@ -517,6 +517,34 @@ TEST_CASE("frames that are never finished, and frames under way when a rank fail
     gone.setBlocks(decomposed.mine);
     orphan = gone.start(test::oblique(), function, settings);
   }
+  const auto error = thrownBy([&] { generator.finish(std::move(*orphan)); });
+  CHECK(error.code == ErrorCode::InvalidArgument);
+  CHECK(error.text.find("the frame's generator no longer exists") != std::string::npos);
+}
+
+TEST_CASE("a generator refuses the frames of another, under way or complete") {
+  const comm::Communicator world = comm::Communicator::world();
+  const auto decomposed = test::dealt(world, "turbulence", {24, 24, 24}, {2, 2, 2}, Layout::Random);
+  const TransferFunction function = test::threeHues(0.8);
+  const GenerateSettings settings = test::smallSettings();
+  VdiGenerator owner(device(), comm::Communicator::world());
+  VdiGenerator other(device(), comm::Communicator::world());
+  owner.setBlocks(decomposed.mine);
+  other.setBlocks(decomposed.mine);
+  const auto expected = owner.generate(test::oblique(), function, settings);
+  const auto start = [&] { return owner.start(test::oblique(), function, settings); };
+  const auto refuses = [&](VdiFrame frame) {
+    const auto error = thrownBy([&] { other.finish(std::move(frame)); });
+    CHECK(error.code == ErrorCode::InvalidArgument);
+    CHECK(error.text.find("another generator started this frame") != std::string::npos);
+  };
+  refuses(start());
+  VdiFrame complete = start();
+  start();
+  VdiFrame last = start();  // completes the first one
+  refuses(std::move(complete));
+  const auto vdi = owner.finish(std::move(last));
+  if (vdi) CHECK(*vdi == *expected);
 }
 
 TEST_CASE("a frame cancelled late leaves nothing in the next one's memory") {

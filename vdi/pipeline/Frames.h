@@ -18,8 +18,11 @@
 
 namespace vdi::detail {
 
+class Frames;
+
 /// State of a VdiFrame, shared with its generator until the frame completes.
 struct FrameState {
+  std::weak_ptr<Frames> owner;  // its generator's frames
   Vdi vdi;
   RankReport report;
   std::vector<RankReport> reports;

@@ -96,7 +96,7 @@ struct VdiGenerator::State {
       pool = std::make_shared<detail::HostPool>(device, shares ? Visible::ToHost : Visible::ToProcess);
       bands = std::make_unique<detail::BandMaker>(device, comm, options);
       steps = std::make_unique<detail::TimeSteps>(comm, bands->caster().volume());
-      frames = std::make_unique<detail::Frames>(device, comm, transport, root);
+      frames = std::make_shared<detail::Frames>(device, comm, transport, root);
       bandDownload = std::make_unique<detail::BandDownload>(device);
       gone = std::make_exception_ptr(
           Error(ErrorCode::InvalidArgument, "the frame's generator no longer exists"));
@@ -117,7 +117,7 @@ struct VdiGenerator::State {
   std::shared_ptr<detail::HostPool> pool;                  // memory of VDIs and pictures
   std::unique_ptr<detail::BandMaker> bands;
   std::unique_ptr<detail::TimeSteps> steps;
-  std::unique_ptr<detail::Frames> frames;
+  std::shared_ptr<detail::Frames> frames;
   std::unique_ptr<detail::BandDownload> bandDownload;  // for lists that go into a file
   std::vector<detail::BandMaker::FlatBand> flat;
   /// Settings and size of the last frame.
@@ -414,6 +414,7 @@ VdiFrame VdiGenerator::start(const Camera& camera, const TransferFunction& trans
   std::function<void()> addLastBand;
   s.comm.together([&] {
     frame = std::make_shared<VdiFrame::State>();
+    frame->owner = s.frames;
     frame->vdi = s.headerOf(*prepared, camera, settings);
     sink = withSegment(precisionOf(frame->vdi.depthCode),
                        [&]<typename Segment>() { return s.hostSink<Segment>(flight, frame->vdi); });
@@ -433,6 +434,9 @@ std::optional<Vdi> VdiGenerator::finish(VdiFrame frame) {
   State& s = *state_;
   s.comm.together([&] {
     if (!frame.state_) throw Error(ErrorCode::InvalidArgument, "there is no frame to finish");
+    // A failed frame tells its own error; only the owner has the last bands of another.
+    if (!frame.state_->error && frame.state_->owner.lock() != s.frames)
+      throw Error(ErrorCode::InvalidArgument, "another generator started this frame");
   });
   s.complete(*frame.state_);
   if (frame.state_->error) std::rethrow_exception(frame.state_->error);

@@ -95,7 +95,8 @@ class VdiGenerator {
   /// same error.
   VdiFrame start(const Camera& camera, const TransferFunction& transferFunction,
                  const GenerateSettings& settings, const Progress& progress = {});
-  /// Waits for the frame. Returns the VDI on rank 0, nullopt on the others.
+  /// Waits for the frame. Returns the VDI on rank 0, nullopt on the others. Throws Error{InvalidArgument} if
+  /// the frame was moved from, another generator started it, or its generator no longer exists.
   std::optional<Vdi> finish(VdiFrame frame);
 
   /// Writes the VDI of generate to a file (io/VdiFile.h). Each rank encodes and writes its own lists: no rank
