@@ -75,7 +75,12 @@ void requireEqualArguments(const vdi::comm::Communicator& world, int argc, char*
   world.requireEqual(std::hash<std::string>{}(all), "command line");
 }
 
-Outcome runTool(int argc, char** argv) {
+void say(const std::string& message) {
+  fmt::print(stderr, "vdi: {}\n", message);
+}
+
+/// Parses the command line and does what it asks for.
+Outcome runCommand(int argc, char** argv) {
   const vdi::comm::Communicator world = vdi::comm::Communicator::world();
   CLI::App app(
       "Volumetric Depth Images: small, view-dependent pictures with depth, for viewing from new "
@@ -99,19 +104,27 @@ Outcome runTool(int argc, char** argv) {
   vdi::apps::addInfo(app, job);
   vdi::bench::addBench(app, job);
   try {
-    try {
-      world.together([&] { app.parse(argc, argv); });
-    } catch (const CLI::ParseError& error) {
-      return outcomeOf(app, error, world.rank() == 0);
-    }
-    requireEqualArguments(world, argc, argv);
-    if (world.size() > 1 && !job.collective) {
-      throw vdi::Error(vdi::ErrorCode::InvalidArgument,
-                       "this subcommand runs on one rank; only generate and bench run on several");
-    }
-    job.run(world);
-    requirePrinted();
-    return {};
+    world.together([&] { app.parse(argc, argv); });
+  } catch (const CLI::ParseError& error) {
+    return outcomeOf(app, error, world.rank() == 0);
+  }
+  requireEqualArguments(world, argc, argv);
+  if (world.size() > 1 && !job.collective) {
+    throw vdi::Error(vdi::ErrorCode::InvalidArgument,
+                     "this subcommand runs on one rank; only generate and bench run on several");
+  }
+  if (world.rank() == 0) {
+    if (const std::string issue = vdi::cacheIssue(); !issue.empty()) say("warning: " + issue);
+  }
+  job.run(world);
+  requirePrinted();
+  return {};
+}
+
+/// Runs the tool, and lets no exception out.
+Outcome runTool(int argc, char** argv) {
+  try {
+    return runCommand(argc, argv);
   } catch (const vdi::Error& error) {
     if (error.code() == vdi::ErrorCode::RemoteRank) return {failed, {}};
     return {error.code() == vdi::ErrorCode::InvalidArgument ? badUsage : failed, error.what()};
@@ -120,10 +133,6 @@ Outcome runTool(int argc, char** argv) {
   } catch (const std::exception& error) {
     return {failed, error.what()};
   }
-}
-
-void say(const std::string& message) {
-  fmt::print(stderr, "vdi: {}\n", message);
 }
 
 /// All ranks end with the worst status, and the lowest rank with a message prints it. A rank that

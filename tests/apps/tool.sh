@@ -318,6 +318,18 @@ refused 2 "" "$vdi" frobnicate
 refused 2 "VDI_BANDS is 'many'; it may be a whole number" env VDI_BANDS=many "$vdi" generate --field sphere "${small[@]}" -o x.vdi
 refused 2 "VDI_VALIDATION is 'yes'; it may be 0 or 1" env VDI_VALIDATION=yes "$vdi" generate --field sphere "${small[@]}" \
   -o x.vdi
+refused 2 "VDI_RANKS_PER_HOST is '-1'; it may be a whole number" "${mpirun[@]}" 1 env VDI_RANKS_PER_HOST=-1 "$vdi" \
+  generate --field sphere "${small[@]}" -o x.vdi
+refused 2 "VDI_RANKS_PER_HOST is 'two'; it may be a whole number" "${mpirun[@]}" 1 "$vdi" generate --field sphere \
+  "${small[@]}" -o x.vdi : -n 1 env VDI_RANKS_PER_HOST=two "$vdi" generate --field sphere "${small[@]}" -o x.vdi
+# A cache only saves time.
+touch file
+for cache in /proc/nope "$folder/file"; do
+  works "a bad VDI_CACHE" env VDI_CACHE="$cache" "$vdi" generate --field sphere "${small[@]}" -o cached.vdi
+  [ "$(grep -c "warning: VDI_CACHE is '$cache'" err.txt)" = 1 ] || fail "no warning of VDI_CACHE=$cache"
+done
+works "a new VDI_CACHE" env VDI_CACHE="$folder/new/cache" "$vdi" generate --field sphere "${small[@]}" -o cached.vdi
+! grep -q warning err.txt || fail "a warning of a cache's folder that can be made"
 refused 1 "nothing-like-this" env VDI_DEVICE=nothing-like-this "$vdi" generate --field sphere "${small[@]}" -o x.vdi
 refused 1 "no-such-folder" "$vdi" generate --field sphere "${small[@]}" -o no-such-folder/x.vdi
 if [ -e x.vdi ] || [ -e x.png ]; then fail "a refused command left a file"; fi

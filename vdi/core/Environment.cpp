@@ -1,13 +1,17 @@
 #include "vdi/core/Environment.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <cerrno>
 #include <charconv>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
+#include <system_error>
 
 #include "vdi/core/Error.h"
 
@@ -90,6 +94,16 @@ std::string cacheFolder() {
   if (caches != nullptr && *caches == '/') return std::string(caches) + "/pv-vdi";
   const char* const home = std::getenv("HOME");
   return home != nullptr && *home == '/' ? std::string(home) + "/.cache/pv-vdi" : "";
+}
+
+std::string cacheIssue() {
+  const std::string folder = cacheFolder();
+  if (folder.empty() || !environmentText("VDI_CACHE")) return "";
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (!failed && ::access(folder.c_str(), W_OK | X_OK) != 0) failed.assign(errno, std::generic_category());
+  if (!failed) return "";
+  return fmt::format("VDI_CACHE is '{}', where compiled shaders can't be kept: {}", folder, failed.message());
 }
 
 void refuseEnvironment(const char* name, std::string_view value) {

@@ -35,6 +35,10 @@ bool environmentFlag(const char* name);
 /// "off", or none of these is set.
 std::string cacheFolder();
 
+/// Why VDI_CACHE's folder can't take data, for a warning: runs go on without it. Empty if it can, or the
+/// variable names no folder. Creates the folder if necessary.
+std::string cacheIssue();
+
 /// Throws Error{InvalidArgument} that names the variable, the invalid `value` and the valid ones.
 [[noreturn]] void refuseEnvironment(const char* name, std::string_view value);
 
