@@ -39,18 +39,15 @@ struct StoredPreSegment {
   vec4 light;
 };
 
-// Form of supersegments in memory: CompactSupersegment with this DepthCode of core/Supersegment.h, or Segment
-// if the step is 0. Shaders are specialised to one of the two (store.glsl).
+// Form of supersegments in memory: ListForm of core/Supersegment.h. Shaders are specialised to one encoding
+// (store.glsl).
 struct StoredForm {
-  float depthFirst;
+  float depthFirst;  // the depth code's, else 0
   float depthStep;
+  uint encoding;
 };
 
 #ifdef __cplusplus
-// The encoding's number, for the constant `encoding` of store.glsl.
-inline uint encodingOf(const StoredForm& form) {
-  return form.depthStep > 0.0F ? 1 : 0;
-}
 // preSegmentsFrom and segmentsFrom use these sizes.
 static_assert(sizeof(StoredPreSegment) == 32 && sizeof(Segment) == 24);
 #endif

@@ -27,7 +27,6 @@ struct ReduceConstants {
   float step;                             // step of the sample lattice
   uint listCount;
   uint subgroupCapacity;  // pre-segments of a list that fit a subgroup; 0: no subgroups
-  uint pad;
   StoredForm form;  // the form of segments
 };
 

@@ -76,7 +76,7 @@ ListsOf<Segment> composite(const std::shared_ptr<gpu::Device>& device, detail::C
                            const detail::Compositor::Options& request) {
   const HostSubLists parts(device, subLists);
   detail::DeviceLists merged;
-  compositor.interleave(parts.parts(), request.code, merged);
+  compositor.interleave(parts.parts(), request.form, merged);
   detail::DeviceLists lists;
   compositor.composite(merged, request, lists);
   compositor.finish();

@@ -83,8 +83,8 @@ TEST_CASE("merging and compositing on the device equal the reference") {
     subValues.push_back(expanded(subCodes.back(), code));
   }
   const SupersegmentLists ofCodes = reference::composite(subValues, settings, inputs.lattice.step);
-  const CompactLists codes =
-      test::composite(device(), compositor, subCodes, {6, 6, inputs.lattice.step, algorithm, code});
+  const CompactLists codes = test::composite(
+      device(), compositor, subCodes, {6, 6, inputs.lattice.step, algorithm, {Precision::Compact, code}});
   CHECK(listsThatDiffer(expanded(codes, code), expanded(reference::compacted(ofCodes, code), code),
                         oneCode) <= expected.listCount() / 25);
   CHECK(device()->validationMessages() == "");

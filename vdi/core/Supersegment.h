@@ -67,10 +67,11 @@ struct DepthCode {
   bool operator==(const DepthCode&) const = default;
 };
 
-/// The precision of lists with this depth code.
-inline Precision precisionOf(const DepthCode& code) {
-  return code.exists() ? Precision::Compact : Precision::Full;
-}
+/// The form of a VDI's lists in memory.
+struct ListForm {
+  Precision precision = Precision::Full;
+  DepthCode code;  // none if the precision has none
+};
 
 /// The code for depths on the lattice. Its step divides a sample, so the lattice's depths have codes of their
 /// own. A lattice without samples, or of more than 8190, has no code.

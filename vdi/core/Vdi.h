@@ -38,6 +38,7 @@ struct Vdi {
   /// The view of all lists.
   View view() const { return View::withMargin(camera, pictureSize().x, pictureSize().y, margin); }
   Precision precision() const { return static_cast<Precision>(lists.index()); }
+  ListForm form() const { return {precision(), depthCode}; }
   const HostVector<std::uint32_t>& offsets() const {  // exclusive prefix sum, [listCount() + 1]
     return std::visit([](const auto& l) -> const HostVector<std::uint32_t>& { return l.offsets; }, lists);
   }

@@ -105,7 +105,7 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
                                 : writes                            ? shared::castProgramWritePreSegments
                                                                     : shared::castProgramCountPreSegments;
   // Of these programs, only the search stores supersegments.
-  const std::uint32_t encoding = program == shared::castProgramSearch ? encodingOf(band.form) : 0;
+  const std::uint32_t encoding = program == shared::castProgramSearch ? band.form.encoding : 0;
   const shared::CastConstants constants{writes ? shared::castModeWrite : shared::castModeSearch,
                                         band.firstRow, band.lastRow};
   const bool counts = program == shared::castProgramCountPreSegments ||

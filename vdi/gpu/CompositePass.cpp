@@ -24,7 +24,7 @@ void CompositePass::record(Commands& commands, const shared::CompositeParams& pa
                                         : shared::compositeProgramCountPreSegments;
   const std::uint32_t mode = write ? shared::compositeModeWrite : shared::compositeModeSearch;
   pipelines_.update(commands, params);
-  commands.dispatch(pipelines_.with({program, params.level >= 0.0F ? 1U : 0U, encodingOf(params.form)}),
+  commands.dispatch(pipelines_.with({program, params.level >= 0.0F ? 1U : 0U, params.form.encoding}),
                     shared::CompositeConstants{mode}, groupsFor(params.listCount, shared::compositeGroup));
 }
 

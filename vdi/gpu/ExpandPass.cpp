@@ -30,7 +30,7 @@ ExpandPass::ExpandPass(std::shared_ptr<Device> device)
 void ExpandPass::record(Commands& commands, const shared::ExpandConstants& constants) {
   const std::uint64_t count = invocations(constants);
   if (count == 0) return;
-  commands.dispatchMany(pipelines_.with({0, 0, encodingOf(constants.form)}), constants, count,
+  commands.dispatchMany(pipelines_.with({0, 0, constants.form.encoding}), constants, count,
                         shared::expandGroup);
 }
 

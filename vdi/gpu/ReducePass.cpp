@@ -53,8 +53,8 @@ void ReducePass::record(Commands& commands, shared::ReduceConstants constants, c
   }
   if (alone) commands.dispatch(alone_, constants, groupsFor(constants.listCount, shared::reduceGroup));
   commands.barrier();
-  commands.dispatch(store_.with({0, 0, encodingOf(constants.form), constants.fitting != 0 ? 1U : 0U}),
-                    constants, groupsFor(constants.listCount, shared::storeGroup));
+  commands.dispatch(store_.with({0, 0, constants.form.encoding, constants.fitting != 0 ? 1U : 0U}), constants,
+                    groupsFor(constants.listCount, shared::storeGroup));
 }
 
 void ReducePass::recordSubgroups(Commands& commands, shared::ReduceConstants& constants) {

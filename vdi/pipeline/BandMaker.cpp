@@ -88,8 +88,8 @@ comm::Ownership BandMaker::ownershipOf(const RayCaster::Cast& cast, const Bands&
 }
 
 /// Collective: sends this rank's lists to their owners.
-void BandMaker::distribute(Slot& slot, const DepthCode& code, Stopwatch& watch, RankReport& report) {
-  slot.parts = slot.distributor->distribute(slot.lists, slot.owned, segmentBytes(code));
+void BandMaker::distribute(Slot& slot, Precision precision, Stopwatch& watch, RankReport& report) {
+  slot.parts = slot.distributor->distribute(slot.lists, slot.owned, segmentBytes(precision));
   report.bytesSent += slot.distributor->bytesSent();
   report.distributeSeconds += watch.lap();
 }
@@ -129,13 +129,13 @@ void BandMaker::makeOwned(const RayCaster::Inputs& inputs, const Progress& progr
     });
     report.subSupersegments += slot.lists.count;
     report.generateSeconds += watch.lap();
-    distribute(slot, inputs.code, watch, report);
+    distribute(slot, inputs.form.precision, watch, report);
     if (band > 0) {
       steps.pass(band - 1);
       watch.lap();  // excludes the step's own time
     }
     comm_.together([&] {
-      compositor_.interleave(slot.parts, inputs.code, merged_[band].interleaved);
+      compositor_.interleave(slot.parts, inputs.form, merged_[band].interleaved);
       steps.compose(band);
       slot.usedBy = compositor_.last();
     });
@@ -176,7 +176,7 @@ void BandMaker::makeComposited(const RayCaster::Inputs& inputs, const Progress& 
                                 maxPerList(settings.supersegments, settings.budget),
                                 inputs.lattice.step,
                                 settings.algorithm,
-                                inputs.code,
+                                inputs.form,
                                 -1.0F};
   const auto compose = [&](std::size_t band) {
     owned.resize(merged_.size());

@@ -102,7 +102,7 @@ class BandMaker {
   };
 
   void agreeOnLists(RayCaster::Cast& cast);
-  void distribute(Slot& slot, const DepthCode& code, Stopwatch& watch, RankReport& report);
+  void distribute(Slot& slot, Precision precision, Stopwatch& watch, RankReport& report);
   comm::Ownership ownershipOf(const RayCaster::Cast& cast, const Bands& all, std::size_t band,
                               std::span<const std::uint32_t> weights) const;
   /// Collective: sends this rank's lists, band after band, to their owners, which merge them by depth. The

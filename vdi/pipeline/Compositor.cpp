@@ -99,11 +99,11 @@ void Compositor::receive(const Distributed& parts) {
 /// constants.mode is interleaveModeCount, then (after a scan) interleaveModeWrite, then interleaveModeFlatten
 /// for a picture.
 void Compositor::recordInterleave(gpu::Commands& commands, const shared::InterleaveConstants& constants) {
-  commands.dispatch(interleave_.with({0, 0, encodingOf(constants.form)}), constants,
+  commands.dispatch(interleave_.with({0, 0, constants.form.encoding}), constants,
                     gpu::groupsFor(constants.listCount, shared::compositeGroup));
 }
 
-void Compositor::interleave(const Distributed& parts, const DepthCode& code, DeviceLists& interleaved,
+void Compositor::interleave(const Distributed& parts, const ListForm& form, DeviceLists& interleaved,
                             const ListBuilder::Behind& behind) {
   finish();
   const std::uint32_t lists = parts.listCount;
@@ -151,7 +151,7 @@ void Compositor::interleave(const Distributed& parts, const DepthCode& code, Dev
   constants.listCount = lists;
   constants.rankCount = static_cast<std::uint32_t>(ranks);
   constants.rowLength = static_cast<std::uint32_t>(rowLength);
-  constants.form = storedForm(code);
+  constants.form = storedForm(form);
   commands_.mark("merge");
   constants.mode = shared::interleaveModeCount;
   if (lists > 0) recordInterleave(commands_, constants);
@@ -174,7 +174,7 @@ void Compositor::apply(const DeviceLists& interleaved, const Options& options) {
   settings_.budget = options.budget;
   settings_.maxPerList = options.maxPerList;
   settings_.level = options.level;
-  settings_.form = storedForm(options.code);
+  settings_.form = storedForm(options.form);
   settings_.interleaved = interleaved.segments.address();
   settings_.interleavedOffsets = interleaved.offsets.address();
   settings_.listCount = interleaved.listCount;
@@ -223,7 +223,7 @@ void Compositor::composite(const DeviceLists& interleaved, const Options& option
   build.algorithm = options.algorithm;
   build.maxPerList = {options.maxPerList, true};
   build.sampleStep = options.sampleStep;
-  build.code = options.code;
+  build.form = options.form;
   build.fitting = interleaved.segments.address();
   build.fittingOffsets = interleaved.offsets.address();
   builder_.start(build, record, lists);
@@ -231,7 +231,7 @@ void Compositor::composite(const DeviceLists& interleaved, const Options& option
   last_ = builder_.last();
 }
 
-void Compositor::flatten(const DeviceLists& interleaved, const DepthCode& code, gpu::Buffer& colors,
+void Compositor::flatten(const DeviceLists& interleaved, const ListForm& form, gpu::Buffer& colors,
                          gpu::Buffer& depths) {
   colors.reserve(device_, interleaved.listCount * sizeof(glm::vec4), MemoryKind::DeviceLocal);
   depths.reserve(device_, interleaved.listCount * sizeof(float), MemoryKind::DeviceLocal);
@@ -243,7 +243,7 @@ void Compositor::flatten(const DeviceLists& interleaved, const DepthCode& code, 
   constants.depths = depths.address();
   constants.listCount = interleaved.listCount;
   constants.mode = shared::interleaveModeFlatten;
-  constants.form = storedForm(code);
+  constants.form = storedForm(form);
   flattens_.begin();
   flattens_.mark("flatten");
   recordInterleave(flattens_, constants);

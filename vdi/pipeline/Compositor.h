@@ -24,14 +24,14 @@ class Compositor {
     std::uint32_t maxPerList = 1;  // N_S, or more with a level
     double sampleStep = 1.0;
     Algorithm algorithm = Algorithm::Merge;
-    DepthCode code;       // code of compact lists
+    ListForm form;
     float level = -1.0F;  // with Budget::Total, from the histogram of all owners
   };
 
   /// Puts all ranks' supersegments of some lists in order of depth. The device goes on after this returns:
   /// `parts` and `interleaved` must stay until `finish`. The transfer queue copies the received lists while
   /// the device computes. `behind` records the steps that follow.
-  void interleave(const Distributed& parts, const DepthCode& code, DeviceLists& interleaved,
+  void interleave(const Distributed& parts, const ListForm& form, DeviceLists& interleaved,
                   const ListBuilder::Behind& behind = {});
 
   /// The histogram of these lists. Waits for the submitted work.
@@ -41,7 +41,7 @@ class Compositor {
   void composite(const DeviceLists& interleaved, const Options& options, DeviceLists& lists);
   /// Composites each list to a pixel of the flat picture, as [listCount] glm::vec4 and [listCount] float. The
   /// device goes on after this returns.
-  void flatten(const DeviceLists& interleaved, const DepthCode& code, gpu::Buffer& colors,
+  void flatten(const DeviceLists& interleaved, const ListForm& form, gpu::Buffer& colors,
                gpu::Buffer& depths);
   /// Waits for the submitted work; then `lists` are complete. Throws as ListBuilder::finish does.
   void finish();

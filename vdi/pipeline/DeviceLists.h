@@ -25,11 +25,6 @@ struct DeviceLists {
   gpu::Submission written;  // other queues wait for this
 };
 
-/// Bytes of one supersegment of lists with this depth code.
-inline std::uint64_t segmentBytes(const DepthCode& code) {
-  return vdi::segmentBytes(precisionOf(code));
-}
-
 /// Empty lists whose memory comes from `pool`.
 template <typename Segment>
 ListsOf<Segment> listsIn(const std::shared_ptr<HostPool>& pool) {

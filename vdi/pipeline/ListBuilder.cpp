@@ -28,8 +28,8 @@ ListBuilder::ListBuilder(std::shared_ptr<gpu::Device> device)
       segmentsFit_(device_, sizeof(std::uint32_t), MemoryKind::DeviceLocal),
       totals_(device_, 2 * sizeof(std::uint32_t), MemoryKind::Readback) {}
 
-shared::StoredForm storedForm(const DepthCode& code) {
-  return {code.first, code.step};
+shared::StoredForm storedForm(const ListForm& form) {
+  return {form.code.first, form.code.step, static_cast<std::uint32_t>(form.precision)};
 }
 
 std::uint64_t ListBuilder::bytesPerList(std::uint32_t maxCount, Algorithm algorithm) {
@@ -163,7 +163,8 @@ void ListBuilder::finishBisection() {
   addTimes();
   scan_.requireNoOverflow();
   lists.count = totals_.mappedAs<std::uint32_t>()[segmentTotal];
-  lists.segments.reserve(device_, lists.count * segmentBytes(options.code), MemoryKind::DeviceLocal);
+  lists.segments.reserve(device_, lists.count * segmentBytes(options.form.precision),
+                         MemoryKind::DeviceLocal);
   BandTargets targets;
   targets.thresholds = thresholds_.address();
   targets.capacities = capacities_.address();
@@ -240,7 +241,7 @@ void ListBuilder::recordWrite() {
   commands_.mark("write");
   started_->record(commands_, targets, true);
   scan_.record(commands_, left_, lists.offsets, listCount, segmentsFit_,
-               lists.segments.size() / segmentBytes(options.code), &preSegmentsFit_);
+               lists.segments.size() / segmentBytes(options.form.precision), &preSegmentsFit_);
   recordTotal(preSegmentOffsets_, listCount, preSegmentTotal);
   recordTotal(lists.offsets, listCount, segmentTotal);
 }
@@ -260,7 +261,7 @@ void ListBuilder::recordReduce() {
   constants.guard = segmentsFit_.address();
   constants.step = static_cast<float>(options.sampleStep);
   constants.listCount = options.listCount();
-  constants.form = storedForm(options.code);
+  constants.form = storedForm(options.form);
   commands_.mark("reduce");
   reduce_.record(commands_, constants, options.maxPerList);
 }
@@ -300,7 +301,7 @@ std::optional<ListBuilder::From> ListBuilder::againFrom(From from) {
   const auto totals = totals_.mappedAs<std::uint32_t>();
   const auto status = statusReadback_.mappedAs<std::uint32_t>();
   const std::uint64_t preSegmentBytes = totals[preSegmentTotal] * sizeof(shared::StoredPreSegment);
-  const std::uint64_t listBytes = totals[segmentTotal] * segmentBytes(options.code);
+  const std::uint64_t listBytes = totals[segmentTotal] * segmentBytes(options.form.precision);
   if (preSegments_.size() < preSegmentBytes) {
     preSegments_.reserve(device_, preSegmentBytes + preSegmentBytes / 4, MemoryKind::DeviceLocal);
     return From::Write;

@@ -37,8 +37,8 @@ struct BandTargets {
   std::uint64_t guard = 0;
 };
 
-/// The form, for shaders, in which lists with this depth code are stored.
-gpu::shared::StoredForm storedForm(const DepthCode& code);
+/// The form as shaders take it.
+gpu::shared::StoredForm storedForm(const ListForm& form);
 
 /// Device milliseconds of all steps, of the algorithm's counting, and of its writing, each with its prefix
 /// sum.
@@ -72,7 +72,7 @@ class ListBuilder {
     Algorithm algorithm = Algorithm::Merge;
     gpu::ReducePass::MaxPerList maxPerList;
     double sampleStep = 1.0;
-    DepthCode code;  // code of compact lists
+    ListForm form;
     /// Merging with other ranks: the agreed values of the counted lists (shaders/shared/quota.h), which are
     /// not counted again. They begin with the band's first list.
     struct Agreed {
@@ -105,7 +105,7 @@ class ListBuilder {
   void start(const Options& options, Record record, DeviceLists& lists, Behind behind = {},
              const gpu::Submission& after = {});
   /// Waits for the steps. If the previous frame's memory was too small, submits steps again. Then `lists` are
-  /// complete, in the precision that the depth code implies. Throws Error{OutOfMemory} if the supersegments
+  /// complete, in the form of the options. Throws Error{OutOfMemory} if the supersegments
   /// do not fit, Error{DeviceFailure} if a list's written count differs from its stored count.
   void finish();
   /// Starts lists that are all empty.

@@ -94,7 +94,7 @@ shared::CastParams RayCaster::prepare(const Inputs& inputs) {
   params.budget = inputs.settings.supersegments;
   params.maxPerList = maxPerList(inputs.settings.supersegments, inputs.settings.budget);
   params.level = -1.0F;
-  params.form = storedForm(inputs.code);
+  params.form = storedForm(inputs.form);
   if (!volume_.empty()) pass_.bind(volume_);
   return params;
 }
@@ -164,7 +164,7 @@ RayCaster::Cast RayCaster::begin(const Inputs& inputs) {
       build.algorithm == Algorithm::Bisection && inputs.cutAtGaps ? 1 : shared::countedStride;
   build.maxPerList = {inputs.runsOnly ? 1 : maxCount, !inputs.cutAtGaps};
   build.sampleStep = inputs.lattice.step;
-  build.code = inputs.code;
+  build.form = inputs.form;
   cast.rowsPerBand = rowsPerBand(inputs, ListBuilder::bytesPerList(maxCount, build.algorithm), bandsWanted());
   cast.params.countedStride = build.countedStride;
   cast.params.countedSamples =

@@ -40,8 +40,8 @@ class RayCaster {
     const TransferTable& table;
     const GenerateSettings& settings;
     bool cutAtGaps;
-    bool runsOnly;   // one supersegment per run, without a search
-    DepthCode code;  // code of compact lists
+    bool runsOnly;  // one supersegment per run, without a search
+    ListForm form;
   };
   /// Called with the finished share; returning false ends the work early with the present result.
   using Progress = std::function<bool(double)>;

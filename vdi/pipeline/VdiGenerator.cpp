@@ -170,9 +170,9 @@ struct VdiGenerator::State {
   }
 
   detail::RayCaster::Inputs castInputsOf(const Prepared& prepared, const GenerateSettings& settings,
-                                         const DepthCode& code, bool runsOnly = false) const {
+                                         const ListForm& form, bool runsOnly = false) const {
     return {steps->scene(), prepared.view,   prepared.lattice, prepared.table,
-            settings,       comm.size() > 1, runsOnly,         code};
+            settings,       comm.size() > 1, runsOnly,         form};
   }
 
   /// Runs the work of a frame. After an error, no work may go on in memory that the next frame takes, so
@@ -223,7 +223,7 @@ struct VdiGenerator::State {
   /// Collective: makes the VDI's lists and hands them to the sink; with several ranks, all but the last band.
   void makeLists(const Prepared& prepared, const GenerateSettings& settings, const Vdi& header,
                  std::vector<detail::OwnedLists>& owned, detail::VdiSink& sink, const Progress& progress) {
-    const detail::RayCaster::Inputs inputs = castInputsOf(prepared, settings, header.depthCode);
+    const detail::RayCaster::Inputs inputs = castInputsOf(prepared, settings, header.form());
     sink.begin(header);
     if (comm.size() == 1) {
       bands->makeAlone(inputs, progress, sink, mine);
@@ -265,7 +265,7 @@ struct VdiGenerator::State {
     return std::make_unique<detail::GatherSink<Segment>>(comm, root, pool, flight, vdi, expected);
   }
 
-  /// A VDI without its lists.
+  /// A VDI without its lists, but in their form.
   Vdi headerOf(const Prepared& prepared, const Camera& camera, const GenerateSettings& settings) const {
     Vdi vdi;
     vdi.camera = camera;
@@ -280,7 +280,9 @@ struct VdiGenerator::State {
     Coloring& coloring = vdi.coloring.emplace();
     coloring.range = steps->scalarRange();
     coloring.function = prepared.legend;
-    if (settings.precision == Precision::Compact) vdi.depthCode = depthCodeFor(prepared.lattice);
+    if (hasDepthCode(settings.precision)) vdi.depthCode = depthCodeFor(prepared.lattice);
+    const bool isPossible = !hasDepthCode(settings.precision) || vdi.depthCode.exists();
+    vdi.lists = noLists(isPossible ? settings.precision : Precision::Full);
     return vdi;
   }
 
@@ -416,7 +418,7 @@ VdiFrame VdiGenerator::start(const Camera& camera, const TransferFunction& trans
     frame = std::make_shared<VdiFrame::State>();
     frame->owner = s.frames;
     frame->vdi = s.headerOf(*prepared, camera, settings);
-    sink = withSegment(precisionOf(frame->vdi.depthCode),
+    sink = withSegment(frame->vdi.precision(),
                        [&]<typename Segment>() { return s.hostSink<Segment>(flight, frame->vdi); });
     addLastBand = [&s, &flight, made = frame.get()] {
       s.bands->addLast(flight.owned, *made->sink, made->report);
@@ -457,7 +459,7 @@ WrittenVdi VdiGenerator::write(const std::filesystem::path& path, const Camera& 
     header.timeStep = stamp.step;
     header.coloring->array = stamp.array;
   });
-  return withSegment(precisionOf(header.depthCode), [&]<typename Segment>() {
+  return withSegment(header.precision(), [&]<typename Segment>() {
     detail::FileSink<Segment> sink(s.comm, root, path, *s.bandDownload);  // allocates no memory
     s.wholeVdi(*prepared, settings, header, sink, progress);
     return sink.written();

@@ -71,8 +71,8 @@ void VdiLoader::start(const Vdi& header, LoadedVdi& target) {
   constants_.tileDepthMasks = target.tileDepthMasks.address();
   constants_.depthRange = target.depthRange.address();
   constants_.lists = size;
-  constants_.form = storedForm(header.depthCode);
-  segmentBytes_ = segmentBytes(header.depthCode);
+  constants_.form = storedForm(header.form());
+  segmentBytes_ = segmentBytes(header.precision());
   constants_.perspective = header.camera.parallelProjection ? 0U : 1U;
 }
 
