@@ -154,6 +154,27 @@ void serve(const ServeOptions& options) {
   endSignals.wait();
 }
 
+void addServerOptions(CLI::App& command, ServeOptions& options) {
+  command
+      .add_option("--host", options.host,
+                  "name or address to listen at; 0.0.0.0: all addresses of this machine")
+      ->capture_default_str();
+  command.add_option("--port", options.port, "port to listen at; 0: any free one")->capture_default_str();
+  addTokenOption(command, options.tokenFile, "default: a new token, which is part of the link");
+  command.add_option("--rate", options.rate, "limit per viewer and second, such as 100Mbit or 5MB")
+      ->type_name("RATE")
+      ->check(requireRate);
+  command.add_option("--viewers", options.viewers, "maximum number of viewers at a time")
+      ->capture_default_str();
+  command.add_option("--certificate", options.certificate, "PEM file of a certificate; turns on TLS")
+      ->type_name("FILE");
+  command.add_option("--key", options.key, "PEM file of the certificate's key")->type_name("FILE");
+  command
+      .add_option("--origin", options.origins,
+                  "another site whose pages may connect, such as https://example.org")
+      ->type_name("ORIGIN");
+}
+
 }  // namespace
 
 void addServe(CLI::App& app, Job& job) {
@@ -168,24 +189,7 @@ void addServe(CLI::App& app, Job& job) {
       command->add_option("inputs", options->inputs, "a folder to follow, or the .vdi files of a series")
           ->type_name("");
   command->add_flag("--finished", options->isFinished, "the folder's series is finished; don't follow it");
-  command
-      ->add_option("--host", options->host,
-                   "name or address to listen at; 0.0.0.0: all addresses of this machine")
-      ->capture_default_str();
-  command->add_option("--port", options->port, "port to listen at; 0: any free one")->capture_default_str();
-  addTokenOption(*command, options->tokenFile, "default: a new token, which is part of the link");
-  command->add_option("--rate", options->rate, "limit per viewer and second, such as 100Mbit or 5MB")
-      ->type_name("RATE")
-      ->check(requireRate);
-  command->add_option("--viewers", options->viewers, "maximum number of viewers at a time")
-      ->capture_default_str();
-  command->add_option("--certificate", options->certificate, "PEM file of a certificate; turns on TLS")
-      ->type_name("FILE");
-  command->add_option("--key", options->key, "PEM file of the certificate's key")->type_name("FILE");
-  command
-      ->add_option("--origin", options->origins,
-                   "another site whose pages may connect, such as https://example.org")
-      ->type_name("ORIGIN");
+  addServerOptions(*command, *options);
   CLI::Option* const from =
       command
           ->add_option("--from", options->from,

@@ -67,46 +67,64 @@ function round(ah, al, inH, inL) {
   return multiply(high, low, P1H, P1L);
 }
 
+/**
+ * The hash of the whole stripes of 32 bytes, in `high` and the returned low half.
+ * @param {DataView} view
+ */
+function ofStripes(view) {
+  // Accumulators begin with P1 + P2, P2, 0 and -P1.
+  let l1 = add(P1H, P1L, P2H, P2L), h1 = high;
+  let h2 = P2H | 0, l2 = P2L | 0, h3 = 0, l3 = 0;
+  let l4 = -P1L | 0, h4 = ~P1H | 0;
+  for (let at = 0; at + 32 <= view.byteLength; at += 32) {
+    l1 = round(h1, l1, view.getInt32(at + 4, true), view.getInt32(at, true));
+    h1 = high;
+    l2 = round(h2, l2, view.getInt32(at + 12, true), view.getInt32(at + 8, true));
+    h2 = high;
+    l3 = round(h3, l3, view.getInt32(at + 20, true), view.getInt32(at + 16, true));
+    h3 = high;
+    l4 = round(h4, l4, view.getInt32(at + 28, true), view.getInt32(at + 24, true));
+    h4 = high;
+  }
+  let l = rotate(h1, l1, 1);
+  let h = high;
+  for (const [ah, al, bits] of [[h2, l2, 7], [h3, l3, 12], [h4, l4, 18]]) {
+    const turned = rotate(ah, al, bits);
+    l = add(h, l, high, turned);
+    h = high;
+  }
+  for (const [ah, al] of [[h1, l1], [h2, l2], [h3, l3], [h4, l4]]) {
+    const mixed = round(0, 0, ah, al);
+    l = multiply(h ^ high, l ^ mixed, P1H, P1L);
+    l = add(high, l, P4H, P4L);
+    h = high;
+  }
+  return l;
+}
+
+/**
+ * Mixes the hash's bits, into `high` and the returned low half.
+ * @param {number} h
+ * @param {number} l
+ */
+function avalanche(h, l) {
+  l ^= (h >>> 1);  // h ^= h >> 33
+  l = multiply(h, l, P2H, P2L);
+  h = high;
+  const shifted = (l >>> 29) | (h << 3);  // h ^= h >> 29
+  l = multiply(h ^ (h >>> 29), l ^ shifted, P3H, P3L);
+  return l ^ high;  // h ^= h >> 32
+}
+
 /** @param {Uint8Array} bytes @returns {{high: number, low: number}} unsigned halves */
 export function xxh64(bytes) {
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const length = bytes.length;
-  let at = 0;
-  let h = 0, l = 0;
-  if (length >= 32) {
-    // Accumulators begin with P1 + P2, P2, 0 and -P1.
-    let l1 = add(P1H, P1L, P2H, P2L), h1 = high;
-    let h2 = P2H | 0, l2 = P2L | 0, h3 = 0, l3 = 0;
-    let l4 = -P1L | 0, h4 = ~P1H | 0;
-    for (; at + 32 <= length; at += 32) {
-      l1 = round(h1, l1, view.getInt32(at + 4, true), view.getInt32(at, true));
-      h1 = high;
-      l2 = round(h2, l2, view.getInt32(at + 12, true), view.getInt32(at + 8, true));
-      h2 = high;
-      l3 = round(h3, l3, view.getInt32(at + 20, true), view.getInt32(at + 16, true));
-      h3 = high;
-      l4 = round(h4, l4, view.getInt32(at + 28, true), view.getInt32(at + 24, true));
-      h4 = high;
-    }
-    l = rotate(h1, l1, 1);
-    h = high;
-    for (const [ah, al, bits] of [[h2, l2, 7], [h3, l3, 12], [h4, l4, 18]]) {
-      const turned = rotate(ah, al, bits);
-      l = add(h, l, high, turned);
-      h = high;
-    }
-    for (const [ah, al] of [[h1, l1], [h2, l2], [h3, l3], [h4, l4]]) {
-      const mixed = round(0, 0, ah, al);
-      l = multiply(h ^ high, l ^ mixed, P1H, P1L);
-      l = add(high, l, P4H, P4L);
-      h = high;
-    }
-  } else {
-    h = P5H | 0;
-    l = P5L | 0;
-  }
+  let l = length >= 32 ? ofStripes(view) : P5L | 0;
+  let h = length >= 32 ? high : P5H | 0;
   l = add(h, l, 0, length);
   h = high;
+  let at = length - length % 32;
   for (; at + 8 <= length; at += 8) {
     const mixed = round(0, 0, view.getInt32(at + 4, true), view.getInt32(at, true));
     l = rotate(h ^ high, l ^ mixed, 27);
@@ -128,12 +146,6 @@ export function xxh64(bytes) {
     l = multiply(high, l, P1H, P1L);
     h = high;
   }
-  l ^= (h >>> 1);  // h ^= h >> 33
-  l = multiply(h, l, P2H, P2L);
-  h = high;
-  const shifted = (l >>> 29) | (h << 3);  // h ^= h >> 29
-  l = multiply(h ^ (h >>> 29), l ^ shifted, P3H, P3L);
-  h = high;
-  l ^= h;  // h ^= h >> 32
-  return {high: h >>> 0, low: l >>> 0};
+  l = avalanche(h, l);
+  return {high: high >>> 0, low: l >>> 0};
 }

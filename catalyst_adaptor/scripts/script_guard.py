@@ -134,119 +134,150 @@ def install(leave, plugin):
     it failed on any. `plugin` is the path of our plugin."""
     global plugin_file
     plugin_file = plugin
-    from paraview.catalyst import v2_internals
-    from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
-    from vtkmodules.vtkCommonCore import vtkLogger
-
-    skip = (__name__, "<string>", v2_internals.__file__, "<frozen importlib", importlib.__file__)
+    from paraview.catalyst import v2_internals as engine
     other_hook = sys.excepthook
-    folders = {}  # folders of extracts, by module
-    owners = {}  # modules' names, by extractor
-    loading = {}
-    last_files = {}  # by extractor
-    told_of = set()  # extractors that replace an earlier run's files
 
     def hook(kind, error, trace):
         if kind is not ScriptFailed:
             other_hook(kind, error, trace)
 
     sys.excepthook = hook
+    skip = (__name__, "<string>", engine.__file__, "<frozen importlib", importlib.__file__)
+    loading = Loading()
+    extracts = Extracts(loading, leave)
 
-    def guarded(function, before=None, after=None, failed=None):
-        def call(*arguments):
-            result, wrong = None, False
-            try:
-                if before:
-                    before(*arguments)
-                with plugin_named():
-                    result = function(*arguments)
-                if after:
-                    after(result, *arguments)
-            except BaseException as error:
-                wrong = True
-                vtkLogger.Log(vtkLogger.VERBOSITY_ERROR, "script", 0, text_of(error, skip))
-            if leave(wrong):
-                if failed:
-                    failed(*arguments)
-                raise ScriptFailed()
-            return result
-        return call
+    def guard(name, **hooks):
+        setattr(engine, name, guarded(getattr(engine, name), leave, skip, **hooks))
 
-    def start_loading(path):
-        loading.clear()
+    guard("register_module", before=lambda path: loading.start())
+    guard("import_and_validate", failed=loading.forget)
+    guard("do_catalyst_initialize", after=lambda result, module: loading.note(module),
+          failed=lambda module: loading.forget(module.__name__))
+    guard("do_catalyst_execute", before=lambda module: set_time_step(), after=lambda result, module: extracts.prepare(module))
+    guard("do_catalyst_finalize")
+
+
+def guarded(function, leave, skip, before=None, after=None, failed=None):
+    """Returns the function between calls of `before` and `after`. If any of these fails on any rank, each rank calls `failed`
+    and raises ScriptFailed, which is reported without the frames of the files `skip`."""
+    def call(*arguments):
+        result, wrong = None, False
+        try:
+            if before:
+                before(*arguments)
+            with plugin_named():
+                result = function(*arguments)
+            if after:
+                after(result, *arguments)
+        except BaseException as error:
+            wrong = True
+            log_error(text_of(error, skip))
+        if leave(wrong):
+            if failed:
+                failed(*arguments)
+            raise ScriptFailed()
+        return result
+    return call
+
+
+def log_error(text):
+    from vtkmodules.vtkCommonCore import vtkLogger
+    vtkLogger.Log(vtkLogger.VERBOSITY_ERROR, "script", 0, text)
+
+
+class Loading:
+    """The script that is being loaded, and what the loaded ones have made."""
+
+    def __init__(self):
+        self.proxies = None  # those before the script that is being loaded
+        self.folders = {}  # folders of extracts, by module's name
+        self.owners = {}  # modules' names, by extractor
+
+    def start(self):
         extend_proxies()
-        loading["proxies"] = registered_proxies()
+        self.proxies = registered_proxies()
 
-    def forget_module(name):
+    def note(self, module):
+        modules.append(module)
+        for group, _, proxy in registered_proxies() - (self.proxies or set()):
+            if group == "extractors":
+                self.owners[proxy] = module.__name__
+        self.folders[module.__name__] = os.environ.get("PARAVIEW_OVERRIDE_EXTRACTS_OUTPUT_DIRECTORY",
+                                                       module.options.ExtractsOutputDirectory)
+
+    def forget(self, name):
         from paraview.catalyst import importers
         importers._path_finder_instance._registered_files.pop(name, None)
         sys.modules.pop(name, None)
         modules[:] = [module for module in modules if module.__name__ != name]
-        forget_new_proxies(loading.get("proxies"))
+        forget_new_proxies(self.proxies)
 
-    def note_folder(result, module):
-        modules.append(module)
-        for group, _, proxy in registered_proxies() - loading.get("proxies", set()):
-            if group == "extractors":
-                owners[proxy] = module.__name__
-        folders[module.__name__] = os.environ.get("PARAVIEW_OVERRIDE_EXTRACTS_OUTPUT_DIRECTORY",
-                                                  module.options.ExtractsOutputDirectory)
+    def folder_of(self, extractor):
+        return self.folders.get(self.owners.get(extractor.SMProxy, ""), "")
 
-    def prepare_extracts(result, module):
-        due = leave_out_same_files(due_extractors())
+
+class Extracts:
+    """Prepares the files of a step before the engine writes them."""
+
+    def __init__(self, loading, leave):
+        self.loading = loading
+        self.leave = leave
+        self.last_files = {}  # by extractor
+        self.told_of = set()  # extractors that replace an earlier run's files
+
+    def prepare(self, module):
+        due = self.leave_out_same_files(due_extractors())
         if due:
-            make_folder(folders.get(module.__name__, ""))
-            tell_of_older_files(due)
+            make_folder(self.loading.folders.get(module.__name__, ""))
+            self.tell_of_older_files(due)
         drawn = [extractor for extractor in due if draws(extractor)]
-        if leave(not all([has_display(extractor) for extractor in drawn])):
-            set_enabled(drawn, False)
-            disabled.extend(drawn)
+        if self.leave(not all([has_display(extractor) for extractor in drawn])):
+            leave_out(drawn)
 
-    def leave_out_same_files(due):
+    def leave_out_same_files(self, due):
         """Returns the extractors without those that would replace another one's file in this step; reports and disables
         these."""
         writers = {}
         for extractor in due:
-            folder = folders.get(owners.get(extractor.SMProxy, ""), "")
-            writers.setdefault((folder, extractor.Writer.FileName), []).append(extractor)
+            writers.setdefault((self.loading.folder_of(extractor), extractor.Writer.FileName), []).append(extractor)
         for (_, name), same in writers.items():
             if len(same) > 1:
-                vtkLogger.Log(vtkLogger.VERBOSITY_ERROR, "script", 0, "%d extractors write the same file '%s'; the first one "
-                              "does, the others need names of their own" % (len(same), name))
-                set_enabled(same[1:], False)
-                disabled.extend(same[1:])
+                log_error("%d extractors write the same file '%s'; the first one does, the others need names of their own" %
+                          (len(same), name))
+                leave_out(same[1:])
         return [extractor for same in writers.values() for extractor in same[:1]]
 
-    def tell_of_older_files(due):
+    def tell_of_older_files(self, due):
         """Tells, once for each extractor, that it replaces files of an earlier run."""
+        from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
+        from vtkmodules.vtkCommonCore import vtkLogger
         for extractor in due:
             key, name = extractor.SMProxy.GetGlobalID(), extractor.Writer.FileName
             try:
                 name = name.format(timestep=helper.GetTimeStep(), time=helper.GetTime())
             except (IndexError, KeyError, ValueError):
                 continue  # it has fields that only its writer knows
-            file = os.path.join(folders.get(owners.get(extractor.SMProxy, ""), ""), name)
-            if key not in told_of and last_files.get(key) != file and os.path.isfile(file):
-                told_of.add(key)
+            file = os.path.join(self.loading.folder_of(extractor), name)
+            if key not in self.told_of and self.last_files.get(key) != file and os.path.isfile(file):
+                self.told_of.add(key)
                 vtkLogger.Log(vtkLogger.VERBOSITY_WARNING, "script", 0, "'%s' is an earlier run's file; this run replaces it "
                               "and the others of its kind" % file)
-            last_files[key] = file
+            self.last_files[key] = file
 
-    def has_display(extractor):
-        try:
-            require_display("the extractor of '%s'" % extractor.Writer.FileName)
-        except RuntimeError as error:
-            vtkLogger.Log(vtkLogger.VERBOSITY_ERROR, "script", 0, str(error))
-            return False
-        return True
 
-    v2_internals.register_module = guarded(v2_internals.register_module, before=start_loading)
-    v2_internals.import_and_validate = guarded(v2_internals.import_and_validate, failed=forget_module)
-    v2_internals.do_catalyst_initialize = guarded(v2_internals.do_catalyst_initialize, after=note_folder,
-                                                  failed=lambda module: forget_module(module.__name__))
-    v2_internals.do_catalyst_execute = guarded(v2_internals.do_catalyst_execute, before=lambda module: set_time_step(),
-                                               after=prepare_extracts)
-    v2_internals.do_catalyst_finalize = guarded(v2_internals.do_catalyst_finalize)
+def has_display(extractor):
+    try:
+        require_display("the extractor of '%s'" % extractor.Writer.FileName)
+    except RuntimeError as error:
+        log_error(str(error))
+        return False
+    return True
+
+
+def leave_out(extractors):
+    """Disables extractors until the step's end."""
+    set_enabled(extractors, False)
+    disabled.extend(extractors)
 
 
 def registered_proxies():

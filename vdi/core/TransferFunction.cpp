@@ -145,6 +145,46 @@ glm::dvec4 meanOver(const TransferFunction& function, const std::vector<double>&
   return sum / (hi - lo);
 }
 
+TransferTableEntry stored(const glm::vec4& entry) {
+  return {entry.r, entry.g, entry.b, entry.a};
+}
+
+/// The scalar of an entry.
+double scalarOf(const TransferTable& table, std::size_t entry) {
+  return table.min +
+         (table.max - table.min) * static_cast<double>(entry) / static_cast<double>(table.entries.size() - 1);
+}
+
+/// The distance between two entries.
+double entrySpacing(const TransferTable& table) {
+  return (table.max - table.min) / static_cast<double>(table.entries.size() - 1);
+}
+
+/// Of two nodes at one scalar, the later one counts. The table's ramp for a step must end at or before the
+/// step, so the entry before the step gets the value behind it.
+void fillFine(const TransferFunction& function, const std::vector<double>& steps, TransferTable& table) {
+  for (std::size_t i = 0; i < table.entries.size(); ++i) {
+    double x = scalarOf(table, i);
+    const auto step = std::upper_bound(steps.begin(), steps.end(), x);
+    if (step != steps.end() && *step < x + entrySpacing(table)) x = *step;
+    table.entries[i] = stored(entryAt(function, x));
+  }
+}
+
+/// Features narrower than an entry count by their mean, so that no ray misses them.
+void fillCoarse(const TransferFunction& function, TransferTable& table) {
+  std::vector<double> nodes;
+  for (const ColorNode& node : function.colors) nodes.push_back(node.x);
+  for (const OpacityNode& node : function.opacities) nodes.push_back(node.x);
+  std::sort(nodes.begin(), nodes.end());
+  const double reach = 0.5 * entrySpacing(table);
+  for (std::size_t i = 0; i < table.entries.size(); ++i) {
+    const double x = scalarOf(table, i);
+    const double lo = std::max(x - reach, table.min);
+    table.entries[i] = stored(meanOver(function, nodes, lo, std::min(x + reach, table.max)));
+  }
+}
+
 }  // namespace
 
 TransferTable bake(const TransferFunction& transferFunction) {
@@ -184,30 +224,10 @@ TransferTable bake(const TransferFunction& transferFunction) {
   std::size_t size = steps.empty() ? smallestTable : tableOfSteps;
   while (size < largestTable && !resolves(size)) size *= 2;
   table.entries.resize(size);
-  const double range = table.max - table.min;
-  const double perEntry = range / static_cast<double>(size - 1);
-  const bool isFine = resolves(size);
-  std::vector<double> nodes;
-  if (!isFine) {
-    for (const ColorNode& node : colors) nodes.push_back(node.x);
-    for (const OpacityNode& node : opacities) nodes.push_back(node.x);
-    std::sort(nodes.begin(), nodes.end());
-  }
-  for (std::size_t i = 0; i < size; ++i) {
-    double x = table.min + range * static_cast<double>(i) / static_cast<double>(size - 1);
-    glm::vec4 entry;
-    if (isFine) {
-      // Of two nodes at one scalar, the later one counts. The table's ramp for a step must end at or before
-      // the step, so the entry before the step gets the value behind it.
-      const auto step = std::upper_bound(steps.begin(), steps.end(), x);
-      if (step != steps.end() && *step < x + perEntry) x = *step;
-      entry = entryAt(transferFunction, x);
-    } else {
-      // Features narrower than an entry count by their mean, so that no ray misses them.
-      entry = meanOver(transferFunction, nodes, std::max(x - 0.5 * perEntry, table.min),
-                       std::min(x + 0.5 * perEntry, table.max));
-    }
-    table.entries[i] = {entry.r, entry.g, entry.b, entry.a};
+  if (resolves(size)) {
+    fillFine(transferFunction, steps, table);
+  } else {
+    fillCoarse(transferFunction, table);
   }
   return table;
 }

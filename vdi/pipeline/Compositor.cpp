@@ -103,26 +103,11 @@ void Compositor::recordInterleave(gpu::Commands& commands, const shared::Interle
                     gpu::groupsFor(constants.listCount, shared::compositeGroup));
 }
 
-void Compositor::interleave(const Distributed& parts, const ListForm& form, DeviceLists& interleaved,
-                            const ListBuilder::Behind& behind) {
-  finish();
-  const std::uint32_t lists = parts.listCount;
+/// Unpacks the received counts, and adds them up to each sub-list's place.
+void Compositor::recordOffsets(const Distributed& parts) {
   const std::uint64_t ranks = parts.subLists.size();
-  const std::uint64_t rowWords = gpu::groupsFor(lists, shared::countsPerWord);
+  const std::uint64_t rowWords = gpu::groupsFor(parts.listCount, shared::countsPerWord);
   const std::uint64_t rowLength = rowWords * shared::countsPerWord;
-  const std::uint64_t rows = ranks * rowLength;
-  interleaved.listCount = lists;
-  interleaved.count = parts.total;
-  interleaved.offsets.reserve(device_, (std::uint64_t{lists} + 1) * wordBytes, MemoryKind::DeviceLocal);
-  interleaved.segments.reserve(device_, parts.total * parts.segmentBytes, MemoryKind::DeviceLocal);
-  subCounts_.reserve(device_, (rows + 1) * wordBytes, MemoryKind::DeviceLocal);
-  subOffsets_.reserve(device_, (rows + 1) * wordBytes, MemoryKind::DeviceLocal);
-  interleavedCounts_.reserve(device_, (std::uint64_t{lists} + 1) * wordBytes, MemoryKind::DeviceLocal);
-  heads_.reserve(device_, parts.total * sizeof(shared::InterleaveHead), MemoryKind::DeviceLocal);
-  receive(parts);
-
-  commands_.begin();
-  commands_.waitFor(transfers_);
   commands_.mark("unpack");
   shared::CountsConstants unpack{};
   unpack.packed = packedCounts_.address();
@@ -137,10 +122,32 @@ void Compositor::interleave(const Distributed& parts, const ListForm& form, Devi
     commands_.fill(subCounts_, r * rowLength * wordBytes, rowLength * wordBytes, 0);
     commands_.barrier();
     commands_.copy(wideCounts_, r * rowLength * wordBytes, subCounts_, r * rowLength * wordBytes,
-                   lists * wordBytes);
+                   parts.listCount * wordBytes);
   }
-  scan_.record(commands_, subCounts_, subOffsets_, static_cast<std::uint32_t>(rows));
+  scan_.record(commands_, subCounts_, subOffsets_, static_cast<std::uint32_t>(ranks * rowLength));
+}
 
+void Compositor::interleave(const Distributed& parts, const ListForm& form, DeviceLists& interleaved,
+                            const ListBuilder::Behind& behind) {
+  finish();
+  const std::uint32_t lists = parts.listCount;
+  const std::uint64_t ranks = parts.subLists.size();
+  const std::uint64_t rowLength =
+      std::uint64_t{gpu::groupsFor(lists, shared::countsPerWord)} * shared::countsPerWord;
+  const std::uint64_t rows = ranks * rowLength;
+  interleaved.listCount = lists;
+  interleaved.count = parts.total;
+  interleaved.offsets.reserve(device_, (std::uint64_t{lists} + 1) * wordBytes, MemoryKind::DeviceLocal);
+  interleaved.segments.reserve(device_, parts.total * parts.segmentBytes, MemoryKind::DeviceLocal);
+  subCounts_.reserve(device_, (rows + 1) * wordBytes, MemoryKind::DeviceLocal);
+  subOffsets_.reserve(device_, (rows + 1) * wordBytes, MemoryKind::DeviceLocal);
+  interleavedCounts_.reserve(device_, (std::uint64_t{lists} + 1) * wordBytes, MemoryKind::DeviceLocal);
+  heads_.reserve(device_, parts.total * sizeof(shared::InterleaveHead), MemoryKind::DeviceLocal);
+  receive(parts);
+
+  commands_.begin();
+  commands_.waitFor(transfers_);
+  recordOffsets(parts);
   shared::InterleaveConstants constants{};
   constants.received = received_.address();
   constants.subOffsets = subOffsets_.address();

@@ -56,6 +56,7 @@ class Compositor {
  private:
   void apply(const DeviceLists& interleaved, const Options& options);
   void receive(const Distributed& parts);
+  void recordOffsets(const Distributed& parts);
   void recordInterleave(gpu::Commands& commands, const gpu::shared::InterleaveConstants& constants);
   void wait();
   void noteTimes();

@@ -89,24 +89,21 @@ void Distributor::packWide(const DeviceLists& lists) {
   commands_.submitAndWait();
 }
 
-Distributed Distributor::distribute(const DeviceLists& lists, const comm::Ownership& owned,
-                                    std::uint64_t segmentBytes) {
+Distributor::Stretch Distributor::stretchOf(int rank, const comm::Ownership& owned) const {
+  const std::span<const std::uint32_t> boundaries = boundaryOffsets_.mappedAs<std::uint32_t>();
+  const auto index = static_cast<std::size_t>(rank);
+  return {owned.of(rank), boundaries[index], boundaries[index + 1] - boundaries[index]};
+}
+
+/// Lays out the parts for other ranks, and returns the bytes of the outbox.
+std::uint64_t Distributor::layOutPieces(const comm::Ownership& owned, std::uint64_t segmentBytes) {
   bytesSent_ = 0;
-  wide_ = tooLarge_.mappedAs<std::uint32_t>()[0] != 0;
-  // Parts for other ranks, and their positions in the outbox.
   pieces_.clear();
   sent_.clear();
-  Stretch kept;
   std::uint64_t outboxBytes = 0;
-  const std::span<const std::uint32_t> boundaries = boundaryOffsets_.mappedAs<std::uint32_t>();
   for (int rank = 0; rank < comm_.size(); ++rank) {
-    const auto index = static_cast<std::size_t>(rank);
-    const Stretch stretch{owned.of(rank), boundaries[index], boundaries[index + 1] - boundaries[index]};
-    if (rank == comm_.rank()) {
-      kept = stretch;
-      continue;
-    }
-    if (stretch.segments == 0) continue;
+    const Stretch stretch = stretchOf(rank, owned);
+    if (rank == comm_.rank() || stretch.segments == 0) continue;
     comm::Exchange::Outgoing piece;
     piece.to = rank;
     piece.at = outboxBytes;
@@ -117,53 +114,71 @@ Distributed Distributor::distribute(const DeviceLists& lists, const comm::Owners
     pieces_.push_back(piece);
     sent_.push_back(stretch);
   }
-  const comm::Exchange::Place outbox = exchange_.outbox(outboxBytes);
+  return outboxBytes;
+}
+
+/// Copies the parts for other ranks to the outbox.
+void Distributor::fillOutbox(const comm::Exchange::Place& outbox, const DeviceLists& lists,
+                             std::uint64_t segmentBytes) {
+  if (pieces_.empty()) return;
+  HostAccess& access = accesses_.of(outbox.memory);
+  transfers_.begin();
+  transfers_.waitFor(lists.written);
+  if (wide_) transfers_.waitFor(commands_);
+  for (std::size_t i = 0; i < pieces_.size(); ++i) {
+    const comm::ListRange range = sent_[i].lists;
+    const std::uint64_t at = outbox.at + pieces_[i].at;
+    const std::uint64_t countBytes = packedBytes(range.count(), wide_);
+    access.recordWrite(transfers_, packed_, packedAt(range.first, wide_), at, countBytes);
+    access.recordWrite(transfers_, lists.segments, sent_[i].firstSegment * segmentBytes,
+                       at + aligned(countBytes), sent_[i].segments * segmentBytes);
+  }
+  transfers_.submitAndWait();
+  access.finish();
+}
+
+/// The parts that this rank owns, by sender; its own among the received ones.
+std::vector<SubLists> Distributor::subListsOf(std::span<const comm::Exchange::Incoming> incoming,
+                                              const Stretch& kept, std::uint64_t segmentBytes) {
+  std::vector<SubLists> subLists;
+  const auto addOwn = [&] {
+    if (kept.segments == 0) return;
+    subLists.push_back(
+        {nullptr, packedAt(kept.lists.first, wide_), wide_, kept.firstSegment * segmentBytes, kept.segments});
+  };
+  bool ownAdded = false;
+  for (const comm::Exchange::Incoming& piece : incoming) {
+    if (!ownAdded && piece.from > comm_.rank()) {
+      addOwn();
+      ownAdded = true;
+    }
+    const bool wide = piece.note[1] != 0;
+    subLists.push_back({&accesses_.of(piece.place.memory), piece.place.at, wide,
+                        piece.place.at + aligned(packedBytes(kept.lists.count(), wide)), piece.note[0]});
+  }
+  if (!ownAdded) addOwn();
+  return subLists;
+}
+
+Distributed Distributor::distribute(const DeviceLists& lists, const comm::Ownership& owned,
+                                    std::uint64_t segmentBytes) {
+  wide_ = tooLarge_.mappedAs<std::uint32_t>()[0] != 0;
+  const comm::Exchange::Place outbox = exchange_.outbox(layOutPieces(owned, segmentBytes));
   comm_.together([&] {
     accesses_.tidy();
     if (wide_) packWide(lists);
-    if (pieces_.empty()) return;
-    HostAccess& access = accesses_.of(outbox.memory);
-    transfers_.begin();
-    transfers_.waitFor(lists.written);
-    if (wide_) transfers_.waitFor(commands_);
-    for (std::size_t i = 0; i < pieces_.size(); ++i) {
-      const comm::ListRange range = sent_[i].lists;
-      const std::uint64_t at = outbox.at + pieces_[i].at;
-      const std::uint64_t countBytes = packedBytes(range.count(), wide_);
-      access.recordWrite(transfers_, packed_, packedAt(range.first, wide_), at, countBytes);
-      access.recordWrite(transfers_, lists.segments, sent_[i].firstSegment * segmentBytes,
-                         at + aligned(countBytes), sent_[i].segments * segmentBytes);
-    }
-    transfers_.submitAndWait();
-    access.finish();
+    fillOutbox(outbox, lists, segmentBytes);
   });
   const std::span<const comm::Exchange::Incoming> incoming = exchange_.send(pieces_);
 
+  const Stretch kept = stretchOf(comm_.rank(), owned);
   Distributed result;
   result.ownCounts = &packed_;
   result.ownSegments = &lists.segments;
   result.ownWritten = wide_ ? commands_.last() : lists.written;
   result.listCount = static_cast<std::uint32_t>(kept.lists.count());
   result.segmentBytes = segmentBytes;
-  const auto addOwn = [&] {
-    if (kept.segments == 0) return;
-    result.subLists.push_back(
-        {nullptr, packedAt(kept.lists.first, wide_), wide_, kept.firstSegment * segmentBytes, kept.segments});
-  };
-  comm_.together([&] {
-    bool ownAdded = false;
-    for (const comm::Exchange::Incoming& piece : incoming) {
-      if (!ownAdded && piece.from > comm_.rank()) {
-        addOwn();
-        ownAdded = true;
-      }
-      const bool wide = piece.note[1] != 0;
-      result.subLists.push_back({&accesses_.of(piece.place.memory), piece.place.at, wide,
-                                 piece.place.at + aligned(packedBytes(kept.lists.count(), wide)),
-                                 piece.note[0]});
-    }
-    if (!ownAdded) addOwn();
-  });
+  comm_.together([&] { result.subLists = subListsOf(incoming, kept, segmentBytes); });
   for (const SubLists& sub : result.subLists) result.total += sub.count;
   return result;
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "vdi/comm/Exchange.h"
@@ -74,6 +75,11 @@ class Distributor {
   };
   void recordCounts(gpu::Commands& commands, const DeviceLists& lists, bool wide);
   void packWide(const DeviceLists& lists);
+  Stretch stretchOf(int rank, const comm::Ownership& owned) const;
+  std::uint64_t layOutPieces(const comm::Ownership& owned, std::uint64_t segmentBytes);
+  void fillOutbox(const comm::Exchange::Place& outbox, const DeviceLists& lists, std::uint64_t segmentBytes);
+  std::vector<SubLists> subListsOf(std::span<const comm::Exchange::Incoming> incoming, const Stretch& kept,
+                                   std::uint64_t segmentBytes);
 
   std::shared_ptr<gpu::Device> device_;
   const comm::Communicator& comm_;

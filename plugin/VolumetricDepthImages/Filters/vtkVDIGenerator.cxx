@@ -390,18 +390,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
       this->DropLostDevice();
     }
   }
-  if (failure) {
-    output->Initialize();
-    if (isCancellation(failure)) {
-      // Like ParaView's own filters, this one doesn't try again until something changes.
-      regeneration.cancel();
-      this->SetAbortOutput(false);  // or the executive empties the output
-      this->KeepEarlier(output);
-      return 1;
-    }
-    this->SayFailure(whatOf(failure));
-    return 0;
-  }
+  if (failure) return this->EndWithout(failure, output);
   this->Internal->Said.isOver();
   if (const auto made = pv::madeOf(output, this->CurrentSettings(), this->Internal->Reports))
     std::ranges::copy(pv::numbersOf(*made), this->LastVdi);
@@ -409,6 +398,20 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
   pv::noteFrame({static_cast<vtkObjectBase*>(this), spent.count(), this->Internal->Reports});
   return 1;
+}
+
+/// Ends a request without a VDI, and returns RequestData's result.
+int vtkVDIGenerator::EndWithout(const std::exception_ptr& failure, vtkImageData* output) {
+  output->Initialize();
+  if (isCancellation(failure)) {
+    // Like ParaView's own filters, this one doesn't try again until something changes.
+    this->Internal->Regeneration.cancel();
+    this->SetAbortOutput(false);  // or the executive empties the output
+    this->KeepEarlier(output);
+    return 1;
+  }
+  this->SayFailure(whatOf(failure));
+  return 0;
 }
 
 void vtkVDIGenerator::SayFailure(const std::string& what) {

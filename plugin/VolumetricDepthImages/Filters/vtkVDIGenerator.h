@@ -20,6 +20,7 @@
 #include <vtkSmartPointer.h>
 
 #include <array>
+#include <exception>
 #include <memory>
 #include <optional>
 #include <string>
@@ -228,6 +229,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   vtkMTimeType CurrentMTime();
   pv::Origin OriginOf(vtkDataObject* input);
   bool TakePreparation(const pv::Origin& origin, vtkImageData* output);
+  int EndWithout(const std::exception_ptr& failure, vtkImageData* output);
   void SayFailure(const std::string& what);
   void TakeReport();
   vdi::GenerateSettings CurrentSettings() const;
