@@ -28,6 +28,16 @@ Vdi coilFrom(const Camera& camera) {
   return *generator.generate(camera, test::threeHues(80.0), test::smallSettings(121, 83, 6));
 }
 
+/// Renderers of one VDI, on the device and on one that runs a GPU's programs.
+struct BothRenderers {
+  explicit BothRenderers(const Vdi& vdi) {
+    plain.setVdi(vdi);
+    asGpu.setVdi(vdi);
+  }
+  VdiRenderer plain{device()};
+  VdiRenderer asGpu{deviceAsGpu()};
+};
+
 }  // namespace
 
 TEST_CASE("rays leave a picture within a tile of lists, through material at its edge") {
@@ -89,10 +99,7 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are skipped: as in the ref
   const bool parallel = GENERATE(false, true);
   const Camera camera = test::oblique(parallel);
   const Vdi vdi = coilFrom(camera);
-  VdiRenderer renderer(device());
-  renderer.setVdi(vdi);
-  VdiRenderer rendererAsGpu(deviceAsGpu());
-  rendererAsGpu.setVdi(vdi);
+  BothRenderers renderers(vdi);
   std::vector<Camera> cameras;
   for (const double angle : {2.0, 20.0, 70.0, 160.0, 290.0}) {
     cameras.push_back(camera.azimuth(angle));
@@ -123,7 +130,7 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are skipped: as in the ref
                               [](const glm::vec4& c) { return c.a > 0.1F; })
                       ? 1
                       : 0;
-      for (VdiRenderer* each : {&renderer, &rendererAsGpu}) {
+      for (VdiRenderer* each : {&renderers.plain, &renderers.asGpu}) {
         const Image seen = each->render(cameras[i], 65, 47, reconstruction);
         CHECK(isView(seen, expected, reconstruction));
         CHECK(depthsThatDiffer(seen, expected, 1e-3F) <= seen.depth.size() / 100);
@@ -138,10 +145,7 @@ TEST_CASE("rays that end at objects, of any part of an image plane: as in the re
   const bool parallel = GENERATE(false, true);
   const Camera camera = test::oblique(parallel);
   const Vdi vdi = coilFrom(camera);
-  VdiRenderer renderer(device());
-  renderer.setVdi(vdi);
-  VdiRenderer rendererAsGpu(deviceAsGpu());
-  rendererAsGpu.setVdi(vdi);
+  BothRenderers renderers(vdi);
   constexpr int width = 65;
   constexpr int height = 47;
   for (const double angle : {0.0, 20.0, 160.0}) {
@@ -181,7 +185,7 @@ TEST_CASE("rays that end at objects, of any part of an image plane: as in the re
           dimmed += expected.rgba[i].a > 0.0F && expected.rgba[i].a < 0.9F * open.rgba[i].a ? 1 : 0;
         }
         CHECK(hidden + dimmed > 50);
-        for (VdiRenderer* each : {&renderer, &rendererAsGpu}) {
+        for (VdiRenderer* each : {&renderers.plain, &renderers.asGpu}) {
           CHECK(isView(each->render(view, ends, reconstruction), expected, reconstruction));
           // The view with ends doesn't affect the next one without.
           CHECK(isView(each->render(view, {}, reconstruction), open, reconstruction));
