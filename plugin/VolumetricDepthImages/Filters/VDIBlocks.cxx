@@ -262,6 +262,7 @@ void addLeaf(vtkDataObject* leaf, const ArrayChoice& choice, const std::string& 
 }
 
 /// Uses the arrays' modification times: a filter that passes a data set on changes only the data set's own.
+/// No two arrays ever have one time, while a new array may lie where a freed one lay.
 void addIdentity(vtkDataObject* leaf, std::vector<std::uint64_t>& identity) {
   auto* image = vtkImageData::SafeDownCast(leaf);
   if (image == nullptr) {
@@ -280,10 +281,9 @@ void addIdentity(vtkDataObject* leaf, std::vector<std::uint64_t>& identity) {
     identity.push_back(static_cast<std::uint64_t>(attributes->GetNumberOfArrays()));
     for (int i = 0; i < attributes->GetNumberOfArrays(); ++i) {
       vtkAbstractArray* array = attributes->GetAbstractArray(i);
-      identity.push_back(reinterpret_cast<std::uintptr_t>(array));
       identity.push_back(array->GetMTime());
+      identity.push_back(array == attributes->GetScalars() ? 1 : 0);
     }
-    identity.push_back(reinterpret_cast<std::uintptr_t>(attributes->GetScalars()));
   }
 }
 
