@@ -30,8 +30,8 @@ using detail::checksumOf;
 using detail::Chunk;
 using detail::decodeChunk;
 using detail::fail;
+using detail::fileHeaderOf;
 using detail::Header;
-using detail::headerOf;
 using detail::kindJson;
 using detail::listsOf;
 using detail::MetadataHeader;
@@ -226,7 +226,7 @@ std::vector<std::byte> encodeHead(const Vdi& vdi, std::span<const ChunkEntry> ta
   requireSoundHeader(vdi);
   validateShape(vdi);
   assert(table.size() == chunksOf(listsOf(vdi)));
-  Header header = headerOf(vdi);
+  Header header = fileHeaderOf(vdi);
   header.chunkCount = static_cast<std::uint32_t>(table.size());
   for (const ChunkEntry& entry : table) {
     header.supersegmentCount += entry.supersegmentCount;

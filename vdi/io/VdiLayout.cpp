@@ -55,7 +55,7 @@ void requireSoundHeader(const Vdi& vdi) {
   if (vdi.budget < 1) fail("the budget is 0 supersegments");
 }
 
-Header headerOf(const Vdi& vdi) {
+Header fileHeaderOf(const Vdi& vdi) {
   Header header{};
   header.magic = magicText;
   header.version = vdi.coloring                  ? metadataVersion

@@ -125,7 +125,7 @@ inline std::uint64_t metadataOffset(const Header& header) {
 /// Checks what validate(Vdi) does not: a usable camera and finite numbers.
 void requireSoundHeader(const Vdi& vdi);
 /// The header without the fields that depend on the chunks.
-Header headerOf(const Vdi& vdi);
+Header fileHeaderOf(const Vdi& vdi);
 /// The VDI that the header describes, without lists.
 Vdi vdiOf(const Header& header);
 

@@ -39,8 +39,8 @@ std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::str
   return text + "device of rank 0: " + device + "\n";
 }
 
-std::optional<vdi::MadeVdi> madeOf(vtkImageData* image, const vdi::GenerateSettings& settings,
-                                   const std::vector<vdi::RankReport>& reports) {
+std::optional<vdi::MadeVdi> madeVdiOf(vtkImageData* image, const vdi::GenerateSettings& settings,
+                                      const std::vector<vdi::RankReport>& reports) {
   vtkFieldData* fields = image->GetFieldData();
   vtkDataArray* offsets = fields->GetArray("VDI.offsets");
   if (offsets == nullptr || reports.empty()) return std::nullopt;

@@ -19,8 +19,8 @@ namespace pv {
 std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::string& device);
 /// Figures of the VDI in the image, which was made with these settings. The next VDI is estimated from them.
 /// Nullopt for an image without a VDI, and without reports.
-std::optional<vdi::MadeVdi> madeOf(vtkImageData* image, const vdi::GenerateSettings& settings,
-                                   const std::vector<vdi::RankReport>& reports);
+std::optional<vdi::MadeVdi> madeVdiOf(vtkImageData* image, const vdi::GenerateSettings& settings,
+                                      const std::vector<vdi::RankReport>& reports);
 
 /// Invoke the events of VDIRecords.h. The second one fills in the filter upstream of the writer.
 void noteFrame(FrameMade frame);

@@ -392,7 +392,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   }
   if (failure) return this->EndWithout(failure, output);
   this->Internal->Said.isOver();
-  if (const auto made = pv::madeOf(output, this->CurrentSettings(), this->Internal->Reports))
+  if (const auto made = pv::madeVdiOf(output, this->CurrentSettings(), this->Internal->Reports))
     std::ranges::copy(pv::numbersOf(*made), this->LastVdi);
   regeneration.finish(output, origin, this->CurrentMTime());  // the time has grown: a map has built its table
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
