@@ -85,14 +85,15 @@ void FolderWatch::watch() const {
                             IN_CREATE | IN_CLOSE_WRITE | IN_MOVED_TO | IN_ONLYDIR);
 }
 
-std::vector<std::filesystem::path> FolderWatch::changed() {
+FolderWatch::Changes FolderWatch::changed() {
   if (descriptor_.isOpen()) {
     std::array<std::byte, 4096> events{};
     while (::read(descriptor(), events.data(), events.size()) > 0) {
     }
     watch();  // before the listing, so that no file appears unseen in between
   }
-  std::vector<std::filesystem::path> files;
+  Changes changes;
+  std::vector<std::filesystem::path>& files = changes.files;
   std::map<std::filesystem::path, FileLook> seen;
   std::error_code error;
   std::filesystem::directory_iterator entries(folder_, error);
@@ -107,11 +108,14 @@ std::vector<std::filesystem::path> FolderWatch::changed() {
     seen.emplace(file, *look);
   }
   if (error) throw Error(ErrorCode::Io, "can't read the folder: " + error.message(), folder_.string());
+  for (const auto& [file, look] : known_) {
+    if (!seen.contains(file)) changes.gone.push_back(file);
+  }
   known_ = std::move(seen);
   std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) {
     return comesBefore(a.filename().string(), b.filename().string());
   });
-  return files;
+  return changes;
 }
 
 }  // namespace vdi::apps

@@ -32,11 +32,15 @@ class FolderWatch {
   /// if the system has no watches left (fs.inotify.max_user_instances).
   int descriptor() const { return descriptor_.number(); }
 
-  /// Returns the files named *.vdi that are new since the last call, or whose size or time has
-  /// changed. They are ordered by name, with numbers compared as numbers. Names that begin with a
-  /// dot are skipped, because io::writeAtomically may leave such files. Links to files of this
-  /// folder are skipped, too. Throws Error{Io} while the folder can't be read.
-  std::vector<std::filesystem::path> changed();
+  struct Changes {
+    std::vector<std::filesystem::path> files;  // that are new, or whose size or time has changed
+    std::vector<std::filesystem::path> gone;   // that were there before
+  };
+  /// Returns the changes of the files named *.vdi since the last call. `files` are ordered by name,
+  /// with numbers compared as numbers. Names that begin with a dot are skipped, because
+  /// io::writeAtomically may leave such files. Links to files of this folder are skipped, too. Throws
+  /// Error{Io} while the folder can't be read.
+  Changes changed();
 
  private:
   void watch() const;

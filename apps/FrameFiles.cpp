@@ -33,6 +33,7 @@ stream::Clock::time_point writtenAt(const std::filesystem::path& file) {
 /// The time that a program may take to write a file under its final name.
 constexpr std::chrono::seconds writingTime{1};
 constexpr char damagedOrGone[] = "the file is damaged or gone";
+constexpr char replaced[] = "the file was replaced";
 
 int makeWakeup() {
   const int descriptor = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
@@ -113,7 +114,9 @@ void FrameFiles::waitForWork() {
 
 void FrameFiles::look() {
   try {
-    add(watch_->changed());
+    const FolderWatch::Changes changes = watch_->changed();
+    add(changes.files);
+    noteGone(changes.gone);
     folderTrouble_.clear();
   } catch (const Error& error) {
     if (folderTrouble_ != error.what()) options_.log(error.what());
@@ -122,8 +125,8 @@ void FrameFiles::look() {
 }
 
 /// Skips a file for now. The watch reports it again when it changes.
-void FrameFiles::leaveOut(const std::filesystem::path& file, const std::string& what) {
-  Incomplete& incomplete = incomplete_[file];
+void FrameFiles::leaveOut(const std::string& name, const std::string& what) {
+  Incomplete& incomplete = incomplete_[name];
   incomplete.what = what;
   incomplete.since = stream::Clock::now();
 }
@@ -132,7 +135,7 @@ void FrameFiles::leaveOut(const std::filesystem::path& file, const std::string& 
 /// some time first.
 void FrameFiles::tellIncomplete() {
   const auto patience = follows() ? writingTime : std::chrono::seconds(0);
-  for (auto& [file, incomplete] : incomplete_) {
+  for (auto& [name, incomplete] : incomplete_) {
     if (incomplete.isTold || stream::Clock::now() - incomplete.since < patience) continue;
     options_.log(incomplete.what + "; it was skipped");
     incomplete.isTold = true;
@@ -150,54 +153,97 @@ FrameFiles::Content FrameFiles::contentOf(const std::filesystem::path& file) {
   return content;
 }
 
-/// The file's last entry, if that has this content, perhaps with another time; otherwise null.
-FrameFiles::Entry* FrameFiles::entryWith(const std::filesystem::path& file, const Content& content) {
-  const auto found = latest_.find(file);
-  if (found == latest_.end()) return nullptr;
-  Entry& entry = series_[found->second];
-  const bool isSame =
-      entry.content.look.size == content.look.size && entry.content.checksum == content.checksum;
-  return isSame ? &entry : nullptr;
+std::string FrameFiles::nameOf(const std::filesystem::path& file) const {
+  return options_.folder.empty() ? file.string() : file.filename().string();
+}
+
+/// The entry of a followed file, if it has this content, perhaps with another time.
+std::optional<std::uint32_t> FrameFiles::indexWith(const std::string& name, const Content& content) const {
+  const auto found = latest_.find(name);
+  if (found == latest_.end()) return std::nullopt;
+  const Content& before = entries_.at(found->second).content;
+  const bool isSame = before.look.size == content.look.size && before.checksum == content.checksum;
+  return isSame ? std::optional(found->second) : std::nullopt;
+}
+
+/// Keeps the entry of a file that still has its content, or has come back with it.
+void FrameFiles::refresh(std::uint32_t index, const Content& content) {
+  Entry& entry = entries_.at(index);
+  entry.content = content;
+  entry.isGone = false;
+  if (!entry.isDamaged) incomplete_.erase(entry.name);
+}
+
+/// Gives a followed file a new entry, and forgets the former one.
+void FrameFiles::replace(const std::string& name, std::uint32_t index) {
+  const auto [at, isNew] = latest_.try_emplace(name, index);
+  if (isNew) return;
+  const std::uint32_t before = std::exchange(at->second, index);
+  isReplaced_[before] = true;
+  entries_.erase(before);
+  kept_.remove_if([before](const stream::FramePtr& frame) { return frame->id == before; });
+}
+
+/// Forgets files that are gone, apart from the last ones, which come back if their file system was only out
+/// of order.
+void FrameFiles::noteGone(const std::vector<std::filesystem::path>& gone) {
+  constexpr std::size_t mostGone = 256;
+  for (const std::filesystem::path& file : gone) {
+    const std::string name = nameOf(file);
+    incomplete_.erase(name);
+    const auto found = latest_.find(name);
+    if (found == latest_.end()) continue;
+    entries_.at(found->second).isGone = true;
+    lastGone_.emplace_back(name, found->second);
+    if (lastGone_.size() <= mostGone) continue;
+    const auto [oldest, index] = lastGone_.front();
+    lastGone_.pop_front();
+    const auto entry = entries_.find(index);
+    if (entry == entries_.end() || !entry->second.isGone)
+      continue;  // another came in its place, or it came back
+    entries_.erase(entry);
+    latest_.erase(oldest);
+  }
 }
 
 /// Adds all files to the series and shows the last complete one. Throws Error as io::readVdiInfo does for a
 /// bad file of a list; bad files of a folder are left out.
 void FrameFiles::add(const std::vector<std::filesystem::path>& files) {
   stream::Series entries;
-  std::size_t unshown = series_.size();
+  std::size_t unshown = isReplaced_.size();
   for (const std::filesystem::path& file : files) {
+    const std::string name = nameOf(file);
     try {
       const Content content = contentOf(file);
-      if (Entry* const same = follows() ? entryWith(file, content) : nullptr) {
-        same->content = content;
-        if (!same->isDamaged) {
-          incomplete_.erase(file);
-        } else if (same == &series_.back()) {
-          unshown = series_.size() - 1;  // its lists may be sound now
-        }
+      const auto index = static_cast<std::uint32_t>(isReplaced_.size());
+      if (const std::optional<std::uint32_t> same = indexWith(name, content)) {
+        refresh(*same, content);
+        // The newest entry's lists may be sound now.
+        if (entries_.at(*same).isDamaged && *same + 1 == index) unshown = *same;
         continue;
       }
       entries.times.push_back(content.time);
       entries.steps.push_back(content.step);
-      latest_[file] = static_cast<std::uint32_t>(series_.size());
-      series_.push_back({file, content});
+      isReplaced_.push_back(false);
+      entries_.emplace(index, Entry{name, content});
+      if (follows()) replace(name, index);
     } catch (const Error& error) {
       if (!watch_) throw;
-      leaveOut(file, error.what());
+      leaveOut(name, error.what());
     }
   }
   if (entries.size() > 0) server_->append(std::move(entries));
   // A viewer that receives this phase has the whole series.
   if (!follows()) server_->setPhase(stream::Phase::Ended);
-  for (auto index = static_cast<std::uint32_t>(series_.size()); index-- > unshown;) {
+  for (auto index = static_cast<std::uint32_t>(isReplaced_.size()); index-- > unshown;) {
     if (send(index, [this](stream::FramePtr frame) { server_->publish(std::move(frame)); })) return;
   }
 }
 
 /// Returns false if the file is bad or gone.
 bool FrameFiles::send(std::uint32_t index, const std::function<void(stream::FramePtr)>& take) {
-  Entry& entry = series_[index];
-  const std::filesystem::path& file = entry.file;
+  Entry& entry = entries_.at(index);
+  const std::filesystem::path file = pathOf(entry.name);
   entry.isDamaged = true;
   try {
     std::vector<std::byte> bytes = io::InputFile(file).readAll();
@@ -207,24 +253,25 @@ bool FrameFiles::send(std::uint32_t index, const std::function<void(stream::Fram
     } catch (const Error& error) {
       throw Error(error.code(), error.what(), file.string());
     }
-    incomplete_.erase(file);
+    incomplete_.erase(entry.name);
     entry.isDamaged = false;
     return true;
   } catch (const Error& error) {
-    leaveOut(file, error.what());
+    leaveOut(entry.name, error.what());
     return false;
   }
 }
 
 /// The reason why the file isn't the entry's any more; empty if it may be. A file that is gone may still be
 /// kept.
-std::string FrameFiles::changeOf(Entry& entry) {
-  const std::optional<FileLook> look = lookAt(entry.file);
+std::string FrameFiles::changeOf(Entry& entry) const {
+  const std::filesystem::path file = pathOf(entry.name);
+  const std::optional<FileLook> look = lookAt(file);
   if (!look || *look == entry.content.look) return {};
   try {
-    const Content content = contentOf(entry.file);
+    const Content content = contentOf(file);
     if (content.look.size != entry.content.look.size || content.checksum != entry.content.checksum)
-      return "the file was replaced";
+      return replaced;
     entry.content = content;
     return {};
   } catch (const Error&) {
@@ -232,19 +279,28 @@ std::string FrameFiles::changeOf(Entry& entry) {
   }
 }
 
+/// Answers with a frame that was shown before. Returns false if it isn't kept.
+bool FrameFiles::provideKept(std::uint32_t index) {
+  const auto found = std::find_if(kept_.begin(), kept_.end(),
+                                  [index](const stream::FramePtr& frame) { return frame->id == index; });
+  if (found == kept_.end()) return false;
+  kept_.splice(kept_.begin(), kept_, found);
+  server_->provide(kept_.front());
+  return true;
+}
+
 void FrameFiles::provide(std::uint32_t index) {
   constexpr std::size_t mostKept = 4;
-  const std::string change = changeOf(series_[index]);
+  const auto entry = entries_.find(index);
+  const std::string change = entry == entries_.end() ? "" : changeOf(entry->second);
   if (!change.empty()) {
     kept_.remove_if([index](const stream::FramePtr& frame) { return frame->id == index; });
     server_->miss({index, change});
     return;
   }
-  const auto found = std::find_if(kept_.begin(), kept_.end(),
-                                  [index](const stream::FramePtr& frame) { return frame->id == index; });
-  if (found != kept_.end()) {
-    kept_.splice(kept_.begin(), kept_, found);
-    server_->provide(kept_.front());
+  if (provideKept(index)) return;
+  if (entry == entries_.end() || entry->second.isGone) {
+    server_->miss({index, isReplaced_[index] ? replaced : damagedOrGone});
     return;
   }
   stream::FramePtr last;

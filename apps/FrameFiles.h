@@ -24,6 +24,7 @@ namespace vdi::apps {
 /// Reads, checks and encodes files on a thread of its own, and passes them to a server as the
 /// frames of one series. A frame's id is its index in the series. A file that is replaced becomes a
 /// new frame, and the former one is missing. A file that was only touched stays the frame that it is.
+/// The memory taken grows with the number of files that exist, and by a bit for each frame.
 class FrameFiles {
  public:
   struct Options {
@@ -55,35 +56,44 @@ class FrameFiles {
     std::uint64_t step = 0;
   };
   struct Entry {
-    std::filesystem::path file;
+    std::string name;  // in the folder, or the path of a listed file
     Content content;
     bool isDamaged = false;  // the file was bad when it was last read in full
+    bool isGone = false;
   };
+  std::filesystem::path pathOf(const std::string& name) const { return options_.folder / name; }
+  std::string nameOf(const std::filesystem::path& file) const;
   static Content contentOf(const std::filesystem::path& file);
-  Entry* entryWith(const std::filesystem::path& file, const Content& content);
+  std::optional<std::uint32_t> indexWith(const std::string& name, const Content& content) const;
   void work();
   void look();
   void add(const std::vector<std::filesystem::path>& files);
+  void refresh(std::uint32_t index, const Content& content);
+  void replace(const std::string& name, std::uint32_t index);
+  void noteGone(const std::vector<std::filesystem::path>& gone);
   void provide(std::uint32_t index);
-  static std::string changeOf(Entry& entry);
+  bool provideKept(std::uint32_t index);
+  std::string changeOf(Entry& entry) const;
   bool send(std::uint32_t index, const std::function<void(stream::FramePtr)>& take);
   bool follows() const { return watch_ && options_.follows; }
   void waitForWork();
-  void leaveOut(const std::filesystem::path& file, const std::string& what);
+  void leaveOut(const std::string& name, const std::string& what);
   void tellIncomplete();
 
   Options options_;
   stream::Server* server_ = nullptr;
   std::optional<FolderWatch> watch_;
-  std::vector<Entry> series_;
-  std::map<std::filesystem::path, std::uint32_t> latest_;  // the last entry of each file
-  std::list<stream::FramePtr> kept_;                       // the last few frames shown
+  std::vector<bool> isReplaced_;                 // for each entry of the series
+  std::map<std::uint32_t, Entry> entries_;       // those of the series that files may still have
+  std::map<std::string, std::uint32_t> latest_;  // a followed file's entry
+  std::deque<std::pair<std::string, std::uint32_t>> lastGone_;  // files that may come back, and their entries
+  std::list<stream::FramePtr> kept_;                            // the last few frames shown
   struct Incomplete {
     std::string what;
     stream::Clock::time_point since;  // the file's last change
     bool isTold = false;
   };
-  std::map<std::filesystem::path, Incomplete> incomplete_;
+  std::map<std::string, Incomplete> incomplete_;
   std::string folderTrouble_;
 
   int wakeup_;        // an eventfd; signals that a member below has changed

@@ -112,7 +112,7 @@ void follow(const RenderOptions& options) {
   FolderWatch watch(options.input);
   Painter painter(options);
   for (std::uint64_t done = 0; options.frames == 0 || done < options.frames;) {
-    const std::optional<Vdi> newest = newestOf(watch.changed());
+    const std::optional<Vdi> newest = newestOf(watch.changed().files);
     if (newest) {
       painter.paint(*newest);
       ++done;

@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import threading
+import time
 import unittest
 
 from tool import PATIENCE, VDI, ServedFolder, make, receive, until
@@ -134,6 +135,15 @@ class ServeTest(ServedFolder):
         os.utime(self.live / "a.vdi")
         other.send(type="show", index=1)
         self.assertEqual(next(other.levels())[1], self.bytes_of("small1"))
+        # Nor is a file that was away for a while.
+        os.remove(self.live / "a.vdi")
+        time.sleep(1)
+        self.appear("small1", "a.vdi")
+        self.appear("small0", "b.vdi")
+        until(lambda: server.frames() == 3, "the frame of b.vdi")
+        viewer.send(type="resume")
+        announced, data = next(levels)
+        self.assertEqual((announced["frame"], data), (2, self.bytes_of("small0")))
         self.assertEqual(server.end(), 0)
 
     def test_tokens(self):

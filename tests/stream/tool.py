@@ -57,8 +57,15 @@ class Server:
         connection.close()
         return reply, body
 
+    def status(self):
+        return json.loads(self.get("/status", Authorization="Bearer " + self.token)[1])
+
     def viewers(self):
-        return json.loads(self.get("/status", Authorization="Bearer " + self.token)[1])["viewers"]
+        return self.status()["viewers"]
+
+    def frames(self):
+        """The number of frames published so far."""
+        return self.status()["frames"]
 
 
 def make(path, size, resolution, supersegments, step=0):
