@@ -1,10 +1,12 @@
 #include "apps/FolderWatch.h"
 
 #include <sys/inotify.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <system_error>
 #include <utility>
 
@@ -30,6 +32,7 @@ std::string numberAt(const std::string& text, std::size_t& at) {
 /// links.
 bool isAnotherName(const std::filesystem::directory_entry& entry) {
   std::error_code error;
+  if (!entry.is_symlink(error)) return false;
   const std::filesystem::path target = std::filesystem::read_symlink(entry.path(), error);
   if (error) return false;
   if (!target.has_parent_path()) return true;
@@ -40,14 +43,16 @@ bool isAnotherName(const std::filesystem::directory_entry& entry) {
   return std::filesystem::weakly_canonical(next, error).parent_path() == folder && !error;
 }
 
+bool isFrame(std::string_view name) {
+  return name.ends_with(".vdi") && !name.starts_with('.');
+}
+
 }  // namespace
 
 std::optional<FileLook> lookAt(const std::filesystem::path& file) {
-  std::error_code noSize;
-  std::error_code noTime;
-  const FileLook look{std::filesystem::file_size(file, noSize),
-                      std::filesystem::last_write_time(file, noTime)};
-  return noSize || noTime ? std::nullopt : std::optional(look);
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return std::nullopt;
+  return FileLook{static_cast<std::uint64_t>(status.st_size), status.st_mtim.tv_sec, status.st_mtim.tv_nsec};
 }
 
 bool comesBefore(const std::string& a, const std::string& b) {
@@ -77,42 +82,101 @@ FolderWatch::FolderWatch(std::filesystem::path folder)
   watch();
 }
 
-/// Watches the folder that has the name now, unless it is watched already.
-void FolderWatch::watch() const {
-  if (!descriptor_.isOpen()) return;
+/// Watches the folder that has the name now. Returns whether it is another one than before.
+bool FolderWatch::watch() {
+  if (!descriptor_.isOpen()) return false;
   // A file that is opened without a name (O_TMPFILE) is created when it gets one.
-  (void)::inotify_add_watch(descriptor(), folder_.c_str(),
-                            IN_CREATE | IN_CLOSE_WRITE | IN_MOVED_TO | IN_ONLYDIR);
+  const int number =
+      ::inotify_add_watch(descriptor(), folder_.c_str(),
+                          IN_CREATE | IN_CLOSE_WRITE | IN_MOVED_TO | IN_DELETE | IN_MOVED_FROM | IN_ONLYDIR);
+  const int before = std::exchange(number_, number);
+  if (before == number) return false;
+  if (before >= 0) (void)::inotify_rm_watch(descriptor(), before);
+  return true;
 }
 
-FolderWatch::Changes FolderWatch::changed() {
-  if (descriptor_.isOpen()) {
-    std::array<std::byte, 4096> events{};
-    while (::read(descriptor(), events.data(), events.size()) > 0) {
+/// Reads the names of the files that the system reports. Returns false if it has lost some.
+bool FolderWatch::readReported(std::set<std::string>& names) const {
+  bool isWhole = true;
+  constexpr std::size_t room = 4096;
+  std::array<char, room> events{};
+  while (descriptor_.isOpen()) {
+    const ssize_t size = ::read(descriptor(), events.data(), events.size());
+    if (size <= 0) break;
+    for (std::size_t at = 0; at < static_cast<std::size_t>(size);) {
+      inotify_event event{};
+      std::memcpy(&event, events.data() + at, sizeof event);
+      if ((event.mask & IN_Q_OVERFLOW) != 0) isWhole = false;
+      const std::string name = event.len > 0 ? events.data() + at + sizeof event : "";
+      if (event.wd == number_ && isFrame(name)) names.insert(name);
+      at += sizeof event + event.len;
     }
-    watch();  // before the listing, so that no file appears unseen in between
   }
-  Changes changes;
-  std::vector<std::filesystem::path>& files = changes.files;
-  std::map<std::filesystem::path, FileLook> seen;
+  return isWhole;
+}
+
+std::chrono::milliseconds FolderWatch::untilListing() const {
+  using std::chrono::milliseconds;
+  const auto left = nextListing_ - std::chrono::steady_clock::now();
+  return std::max(std::chrono::ceil<milliseconds>(left), milliseconds(0));
+}
+
+/// Compares a file with what is known of it.
+void FolderWatch::check(const std::string& name, Changes& changes) {
+  const std::filesystem::path file = folder_ / name;
+  std::error_code error;
+  const std::optional<FileLook> look =
+      isAnotherName(std::filesystem::directory_entry(file, error)) ? std::nullopt : lookAt(file);
+  const auto known = known_.find(name);
+  if (look) {
+    if (known != known_.end() && known->second == *look) return;
+    known_[name] = *look;
+    changes.files.push_back(file);
+  } else if (known != known_.end()) {
+    known_.erase(known);
+    changes.gone.push_back(file);
+  }
+}
+
+/// Compares the whole folder with what is known of it.
+void FolderWatch::list(Changes& changes) {
+  constexpr std::chrono::steady_clock::duration shortest = std::chrono::milliseconds(250);
+  constexpr std::chrono::steady_clock::duration longest = std::chrono::minutes(1);
+  constexpr int share = 50;  // of the time
+  const auto begin = std::chrono::steady_clock::now();
+  std::map<std::string, FileLook> seen;
   std::error_code error;
   std::filesystem::directory_iterator entries(folder_, error);
   for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
     const std::filesystem::path& file = entries->path();
-    if (file.extension() != ".vdi" || file.filename().string().starts_with('.')) continue;
-    if (isAnotherName(*entries)) continue;
+    std::string name = file.filename().string();
+    if (!isFrame(name) || isAnotherName(*entries)) continue;
     const std::optional<FileLook> look = lookAt(file);
     if (!look) continue;  // the file may vanish between two listings
-    const auto before = known_.find(file);
-    if (before == known_.end() || before->second != *look) files.push_back(file);
-    seen.emplace(file, *look);
+    const auto before = known_.find(name);
+    if (before == known_.end() || before->second != *look) changes.files.push_back(file);
+    seen.emplace_hint(seen.end(), std::move(name), *look);
   }
+  const auto end = std::chrono::steady_clock::now();
+  nextListing_ = end + std::clamp((end - begin) * share, shortest, longest);
   if (error) throw Error(ErrorCode::Io, "can't read the folder: " + error.message(), folder_.string());
-  for (const auto& [file, look] : known_) {
-    if (!seen.contains(file)) changes.gone.push_back(file);
+  for (const auto& [name, look] : known_) {
+    if (!seen.contains(name)) changes.gone.push_back(folder_ / name);
   }
   known_ = std::move(seen);
-  std::sort(files.begin(), files.end(), [](const auto& a, const auto& b) {
+}
+
+FolderWatch::Changes FolderWatch::changed() {
+  Changes changes;
+  std::set<std::string> names;
+  const bool isWhole = readReported(names);
+  const bool isOther = watch();  // before the listing, so that no file appears unseen in between
+  if (!isWhole || isOther || untilListing() == std::chrono::milliseconds(0)) {
+    list(changes);
+  } else {
+    for (const std::string& name : names) check(name, changes);
+  }
+  std::sort(changes.files.begin(), changes.files.end(), [](const auto& a, const auto& b) {
     return comesBefore(a.filename().string(), b.filename().string());
   });
   return changes;

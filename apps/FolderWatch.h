@@ -1,12 +1,13 @@
-// Finds new .vdi files in a folder by listing it. The system reports changes of a local folder.
-// Network file systems don't report files from other machines, so their folders must be listed
-// repeatedly.
+// Finds new .vdi files in a folder. The system reports changes that this machine makes. Network file
+// systems don't report files from other machines, so folders are listed from time to time, too.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -16,11 +17,12 @@ namespace vdi::apps {
 
 /// Properties that reveal a change of a file without reading it.
 struct FileLook {
-  std::uintmax_t size = 0;
-  std::filesystem::file_time_type time;
+  std::uint64_t size = 0;
+  std::int64_t seconds = 0;  // of the last change
+  std::int64_t nanoseconds = 0;
   bool operator==(const FileLook&) const = default;
 };
-/// The file's properties; nullopt if the file is gone.
+/// The file's properties; nullopt if the file is gone, or isn't a regular file.
 std::optional<FileLook> lookAt(const std::filesystem::path& file);
 
 class FolderWatch {
@@ -31,6 +33,10 @@ class FolderWatch {
   /// Becomes readable when this machine has changed the folder since the last call of changed(). -1
   /// if the system has no watches left (fs.inotify.max_user_instances).
   int descriptor() const { return descriptor_.number(); }
+  /// The time until changed() lists the folder although the system reports nothing: at least 250 ms,
+  /// and so much more for large folders and slow file systems that listing takes 2 % of the time, but
+  /// no more than a minute.
+  std::chrono::milliseconds untilListing() const;
 
   struct Changes {
     std::vector<std::filesystem::path> files;  // that are new, or whose size or time has changed
@@ -43,11 +49,16 @@ class FolderWatch {
   Changes changed();
 
  private:
-  void watch() const;
+  bool watch();
+  bool readReported(std::set<std::string>& names) const;
+  void list(Changes& changes);
+  void check(const std::string& name, Changes& changes);
 
   std::filesystem::path folder_;
   Descriptor descriptor_;
-  std::map<std::filesystem::path, FileLook> known_;
+  int number_ = -1;  // of the watch; -1: none
+  std::chrono::steady_clock::time_point nextListing_;
+  std::map<std::string, FileLook> known_;  // by name
 };
 
 /// Orders "b2" before "b10".

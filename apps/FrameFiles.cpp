@@ -103,10 +103,19 @@ void FrameFiles::work() {
   }
 }
 
+/// The time until something is due in a followed folder: the next listing, or a line on an incomplete file.
+std::chrono::milliseconds FrameFiles::untilWork() const {
+  constexpr std::chrono::milliseconds lineDelay{250};
+  const bool awaitsLine = std::any_of(incomplete_.begin(), incomplete_.end(),
+                                      [](const auto& file) { return !file.second.isTold; });
+  const std::chrono::milliseconds listing = watch_->untilListing();
+  return awaitsLine ? std::min(listing, lineDelay) : listing;
+}
+
 void FrameFiles::waitForWork() {
   std::array<pollfd, 2> descriptors{pollfd{wakeup_, POLLIN, 0},
                                     pollfd{follows() ? watch_->descriptor() : -1, POLLIN, 0}};
-  const int timeout = follows() ? static_cast<int>(options_.interval.count()) : -1;
+  const int timeout = follows() ? static_cast<int>(untilWork().count()) : -1;
   (void)::poll(descriptors.data(), descriptors.size(), timeout);
   eventfd_t count = 0;
   (void)::eventfd_read(wakeup_, &count);

@@ -31,7 +31,6 @@ class FrameFiles {
     std::vector<std::filesystem::path> files;     // a finished series; empty: `folder` is set
     std::filesystem::path folder;                 // the folder whose files are the series
     bool follows = true;                          // whether to watch the folder for new files
-    std::chrono::milliseconds interval{250};      // between listings of a folder that reports no changes
     std::function<void(const std::string&)> log;  // gets one line, from any thread
   };
   explicit FrameFiles(Options options);
@@ -77,6 +76,7 @@ class FrameFiles {
   bool send(std::uint32_t index, const std::function<void(stream::FramePtr)>& take);
   bool follows() const { return watch_ && options_.follows; }
   void waitForWork();
+  std::chrono::milliseconds untilWork() const;
   void leaveOut(const std::string& name, const std::string& what);
   void tellIncomplete();
 

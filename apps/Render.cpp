@@ -87,9 +87,8 @@ class Painter {
 
 /// Waits for changes of a folder, whose file system may not report them.
 void awaitChange(const FolderWatch& watch) {
-  constexpr std::chrono::milliseconds interval(250);
   pollfd descriptor{watch.descriptor(), POLLIN, 0};
-  (void)::poll(&descriptor, 1, static_cast<int>(interval.count()));
+  (void)::poll(&descriptor, 1, static_cast<int>(watch.untilListing().count()));
 }
 
 /// The last complete VDI of some files. The watch reports an incomplete file again when it changes.

@@ -91,6 +91,26 @@ class ServeTest(ServedFolder):
         viewer.send(type="show", index=9)
         self.assertEqual(viewer.end(), 4400)
 
+    def test_a_large_folder_costs_little(self):
+        for number in range(6000):
+            os.link(self.made / "small0.vdi", self.live / f"{number:06}.vdi")
+        server = self.serve(self.live)
+        viewer = self.view(server)
+        viewer.hello(server.token)
+        levels = viewer.levels()
+        self.assertEqual(next(levels)[0]["frame"], 5999)
+        idle = 4
+        before = server.ticks()
+        time.sleep(idle)
+        spent = (server.ticks() - before) / os.sysconf("SC_CLK_TCK")
+        self.assertLess(spent, 0.04 * idle)
+        # The folder is still watched.
+        for number in range(3):
+            self.appear(f"small{(number + 1) % 2}", "z.vdi")
+            self.assertEqual(next(levels)[0]["frame"], 6000 + number)
+        self.assertEqual(server.end(), 0)
+        self.assertEqual(server.said(), "")
+
     def test_links_to_files_of_the_folder_are_no_frames(self):
         server = self.serve(self.live)
         viewer = self.view(server)

@@ -57,6 +57,11 @@ class Server:
         connection.close()
         return reply, body
 
+    def ticks(self):
+        """The processor's time that the server has taken."""
+        fields = pathlib.Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+        return int(fields[11]) + int(fields[12])
+
     def status(self):
         return json.loads(self.get("/status", Authorization="Bearer " + self.token)[1])
 
