@@ -20,7 +20,6 @@
 #include "apps/StreamOptions.h"
 #include "vdi/core/Error.h"
 #include "vdi/page/Page.h"
-#include "vdi/stream/GivenToken.h"
 #include "vdi/stream/Pipe.h"
 #include "vdi/stream/Server.h"
 #include "vdi/stream/Token.h"
@@ -135,7 +134,7 @@ stream::ServerOptions serverOf(const ServeOptions& options, const std::string& k
 void relay(const ServeOptions& options) {
   constexpr std::chrono::milliseconds pause{100};
   const EndSignals endSignals;
-  const std::string known = stream::givenToken(options.tokenFile);
+  const std::string known = tokenOf(options.tokenFile);
   Relay relay(clientOf(options.from, options.fromTokenFile), serverOf(options, known));
   printLink(relay.server(), !known.empty());
   while (!endSignals.hasCome()) relay.step(pause);
@@ -144,7 +143,7 @@ void relay(const ServeOptions& options) {
 void serve(const ServeOptions& options) {
   const EndSignals endSignals;
   FrameFiles files(filesOf(options));
-  const std::string known = stream::givenToken(options.tokenFile);
+  const std::string known = tokenOf(options.tokenFile);
   stream::ServerOptions server = serverOf(options, known);
   server.show = [&files](std::uint32_t index) { files.show(index); };
   stream::Server running(std::move(server));
@@ -165,6 +164,7 @@ void addServerOptions(CLI::App& command, ServeOptions& options) {
       ->type_name("RATE")
       ->check(requireRate);
   command.add_option("--viewers", options.viewers, "maximum number of viewers at a time")
+      ->check(requirePositive)
       ->capture_default_str();
   command.add_option("--certificate", options.certificate, "PEM file of a certificate; turns on TLS")
       ->type_name("FILE");
@@ -172,7 +172,8 @@ void addServerOptions(CLI::App& command, ServeOptions& options) {
   command
       .add_option("--origin", options.origins,
                   "another site whose pages may connect, such as https://example.org")
-      ->type_name("ORIGIN");
+      ->type_name("ORIGIN")
+      ->check(requireOrigin);
 }
 
 }  // namespace

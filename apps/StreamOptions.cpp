@@ -3,16 +3,30 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include <sys/stat.h>
+
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
+#include <regex>
 
 #include "vdi/core/Error.h"
 #include "vdi/stream/GivenToken.h"
 #include "vdi/stream/Url.h"
 
 namespace vdi::apps {
+
+std::string tokenOf(const std::string& file) {
+  constexpr mode_t others = S_IRGRP | S_IROTH;
+  std::string token = stream::givenToken(file);
+  struct stat status {};
+  if (!file.empty() && ::stat(file.c_str(), &status) == 0 && (status.st_mode & others) != 0) {
+    fmt::print(stderr, "vdi: warning, other users can read the token in {}; chmod 600 keeps it secret\n",
+               file);
+  }
+  return token;
+}
 
 stream::ClientOptions clientOf(const std::string& from, const std::string& tokenFile) {
   stream::ClientOptions options;
@@ -23,7 +37,7 @@ stream::ClientOptions clientOf(const std::string& from, const std::string& token
     return options;
   }
   options.url = stream::parseUrl(from);
-  if (options.url.token.empty()) options.url.token = stream::givenToken(tokenFile);
+  if (options.url.token.empty()) options.url.token = tokenOf(tokenFile);
   if (options.url.token.empty()) {
     throw Error(ErrorCode::InvalidArgument, "the link has no token; use --token-file",
                 options.url.authority());
@@ -60,6 +74,17 @@ std::string requireRate(const std::string& text) {
   } catch (const Error& error) {
     return error.what();
   }
+}
+
+std::string requireOrigin(const std::string& text) {
+  static const std::regex form(R"((https?)://([a-z0-9._-]+|\[[0-9a-f:.]+\])(:([1-9][0-9]*))?)");
+  std::smatch parts;
+  const bool isWhole = std::regex_match(text, parts, form);
+  const bool hasUsualPort = isWhole && parts[4] == (parts[1] == "https" ? "443" : "80");
+  if (isWhole && !hasUsualPort) return "";
+  return "'" + text +
+         "' is not an origin, such as https://example.org or http://example.org:8080: lower case, without a "
+         "path and without the usual port";
 }
 
 }  // namespace vdi::apps

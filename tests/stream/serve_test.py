@@ -187,6 +187,13 @@ class ServeTest(ServedFolder):
             self.assertEqual(done.returncode, 0, done.stderr)
             given.end()
             self.assertNotIn(secret, given.said())
+        # Only a file that others can read is worth a line.
+        for mode, lines in ((0o600, 0), (0o640, 1), (0o604, 1)):
+            file.chmod(mode)
+            given = self.serve(self.made / "small0.vdi", "--token-file", file)
+            given.end()
+            self.assertEqual(given.said().count("\n"), lines, given.said())
+            self.assertEqual(given.said().count(f"other users can read the token in {file}"), lines)
         file.write_text("short\n")
         done = subprocess.run([VDI, "serve", self.live, "--token-file", file], capture_output=True, text=True,
                               timeout=PATIENCE, check=False)
@@ -244,6 +251,20 @@ class ServeTest(ServedFolder):
             self.view(server, protocol="pv-vdi.2")
         with self.assertRaises(Refused):
             self.view(server, target="/")
+
+    def test_options_that_could_not_work(self):
+        wrong = [["--origin", text] for text in ("foo", "null", "https://a.example/", "https://a.example/path", "a.example",
+                                                 "HTTPS://a.example", "https://A.example", "https://a.example:443",
+                                                 "http://a.example:80", "http://a.example:", "http://:8080", "*", "")]
+        for arguments in [*wrong, ["--viewers", "0"]]:
+            done = subprocess.run([VDI, "serve", self.live, *arguments], capture_output=True, text=True, timeout=PATIENCE,
+                                  check=False)
+            self.assertEqual(done.returncode, 2, arguments)
+            self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+            if arguments in wrong:
+                self.assertIn("https://example.org", done.stderr)
+        for origin in ("http://a.example:8080", "https://a-b.example", "http://127.0.0.1:8000", "http://[::1]:8080"):
+            self.assertEqual(self.serve(self.live, "--origin", origin).end(), 0)
 
     def test_bad_messages(self):
         server = self.serve(self.made / "small0.vdi")
@@ -322,6 +343,7 @@ class ServeTest(ServedFolder):
     def test_a_server_killed_in_mid_frame_is_found_again(self):
         self.appear("small0", "a.vdi")
         token = self.folder / "token"
+        token.touch(0o600)
         token.write_text("t" * 32)
         server = self.serve(self.live, "--token-file", token, "--rate", "400kbit")  # too little for a large one
         got = self.folder / "got"
