@@ -11,8 +11,8 @@ import sys
 import numpy as np
 from skimage import io as images
 
-from pagetest import (HEIGHT, PICTURES, VDI, WIDTH, azimuth, bare, camera_of, check, compare, failures, final, message_of, open_page,
-                      page_of, rendered, rendering, run, shown, vdi, whole)
+from pagetest import (HEIGHT, PICTURES, WIDTH, azimuth, bare, camera_of, check, compare, failures, final, message_of,
+                      open_page, page_of, rendered, rendering, run, shown, vdi, whole)
 
 
 def test_pictures(browser):
