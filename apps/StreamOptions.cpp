@@ -5,11 +5,13 @@
 
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
 #include <regex>
+#include <string_view>
 
 #include "vdi/core/Error.h"
 #include "vdi/stream/GivenToken.h"
@@ -43,6 +45,19 @@ stream::ClientOptions clientOf(const std::string& from, const std::string& token
                 options.url.authority());
   }
   return options;
+}
+
+void hideTokens(std::span<char* const> arguments) {
+  constexpr std::string_view name = "token=";
+  for (char* const argument : arguments) {
+    const std::string_view text(argument);
+    const std::size_t fragment = std::min(text.find('#'), text.size());
+    for (std::size_t at = text.find(name, fragment); at != std::string_view::npos; at = text.find(name, at)) {
+      at += name.size();
+      const std::size_t end = std::min(text.find_first_of("& '\"", at), text.size());
+      std::fill(argument + at, argument + end, 'x');
+    }
+  }
 }
 
 void addTokenOption(CLI::App& command, std::string& file, const std::string& otherwise) {

@@ -1,6 +1,7 @@
 // Options that vdi serve and vdi receive share.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "vdi/stream/Client.h"
@@ -19,6 +20,10 @@ stream::ClientOptions clientOf(const std::string& from, const std::string& token
 /// The token that the user has set, as stream::givenToken returns it. Prints a line if others can
 /// read the file.
 std::string tokenOf(const std::string& file);
+
+/// Overwrites the tokens of links with x in the program's arguments, which other users of the
+/// machine can list.
+void hideTokens(std::span<char* const> arguments);
 
 /// Adds --token-file.
 void addTokenOption(CLI::App& command, std::string& file, const std::string& otherwise);

@@ -21,6 +21,7 @@
 #include "BuildCommit.h"
 #include "apps/Commands.h"
 #include "apps/Help.h"
+#include "apps/StreamOptions.h"
 #include "bench/Bench.h"
 #include "vdi/core/Environment.h"
 #include "vdi/core/Error.h"
@@ -109,6 +110,7 @@ Outcome runCommand(int argc, char** argv) {
     return outcomeOf(app, error, world.rank() == 0);
   }
   requireEqualArguments(world, argc, argv);
+  vdi::apps::hideTokens({argv, static_cast<std::size_t>(argc)});
   if (world.size() > 1 && !job.collective) {
     throw vdi::Error(vdi::ErrorCode::InvalidArgument,
                      "this subcommand runs on one rank; only generate and bench run on several");

@@ -1,5 +1,6 @@
 """`vdi serve` and `vdi receive` as users run them. Argument: vdi."""
 import os
+import pathlib
 import resource
 import shutil
 import signal
@@ -199,6 +200,19 @@ class ServeTest(ServedFolder):
                               timeout=PATIENCE, check=False)
         self.assertEqual(done.returncode, 2)
         self.assertNotIn("short\n", done.stderr)
+
+    def test_no_token_stays_on_a_command_line(self):
+        server = self.serve(self.live)
+        relay = self.serve("--from", server.link)
+        receiver, _ = self.record(relay.link)
+        for process in (relay.process, receiver):
+            shown = pathlib.Path(f"/proc/{process.pid}/cmdline")
+            until(lambda shown=shown: b"#token=xxxx" in shown.read_bytes(), "a command line without a token")
+            for token in (server.token, relay.token):
+                self.assertNotIn(token.encode(), shown.read_bytes())
+        until(lambda: relay.viewers() == 1, "a viewer, whose link still works")
+        receiver.kill()
+        receiver.wait(PATIENCE)
 
     def test_http(self):
         server = self.serve(self.made / "small0.vdi")
