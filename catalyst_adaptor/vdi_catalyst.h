@@ -98,8 +98,11 @@ enum { VDI_CATALYST_POINTS = 0, VDI_CATALYST_CELLS = 1 };
  *
  * Neighbours are blocks of any rank and any spacing. They may share the points of their common face, or end
  * one cell apart (points), or meet at a face (cells). Ranks exchange the values that a block needs of its
- * neighbours, whether it has ghost layers or not. Its own ghost layers are used beside blocks of equal
- * spacing.
+ * neighbours, whether it has ghost layers or not. A neighbour's values replace ghost values wherever it has
+ * cells of its own. Ghost layers thus count beyond the domain only, as those of periodic or mirrored sides.
+ * There, values straight beside a block are read. Those at edges and corners (beyond the block along two or
+ * three axes) may be unset: they are never shown, but continued from the layers' faces. Finite ones count in
+ * an automatic range of colours all the same.
  *
  * Blocks of different spacing may overlap: the finest is shown. Blocks of equal spacing must not overlap,
  * except by ghost layers announced as such. An overlap by more than a thousandth of a cell is an error that

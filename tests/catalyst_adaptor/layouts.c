@@ -2,6 +2,8 @@
  * script, the cells along each axis, the layouts' names, which are the arrays' names too, separated by
  * commas, and the number of steps. Each rank has a part, as MPI_Dims_create says. All bytes that belong to no
  * value are NaN. Odd ranks lack the array "partial", and have one of another name instead of "elsewhere".
+ * If the first name is "star_mirror" or "star_periodic", blocks have a ghost layer on all sides, also beyond
+ * the domain, and those at edges and corners are NaN, as of PETSc's DMDA with a star stencil.
  * The process takes the same memory for any one layout, so that what the adaptor takes can be seen. It prints
  * the bytes of the field. Exit status 0 if all went well. */
 #include <math.h>
@@ -37,7 +39,7 @@ static char* take(int64_t bytes) {
   return memory;
 }
 
-/* `cells`: of the rank's block. */
+/* `cells`: of the rank's block, ghosts included. */
 static array lay(const char* name, const int32_t* cells) {
   array a = {name, VDI_CATALYST_F32, 1, {{0, 0, 0}, 0}, NULL, {0.0, 0.0, 0.0}, 0};
   const int64_t nx = cells[0];
@@ -92,6 +94,13 @@ static void store(const array* a, const int32_t* at, double value) {
   if (a->type == VDI_CATALYST_I64) memcpy(to, &i64, sizeof i64);
 }
 
+/* The index of the cell whose value a cell of the ghost layer beyond the domain has, or `index` itself. */
+static int32_t source_of(int32_t index, int n, int is_periodic) {
+  if (index >= 0 && index < n) return index;
+  if (is_periodic) return (index + n) % n;
+  return index < 0 ? -index : 2 * (n - 1) - index;
+}
+
 int main(int argc, char** argv) {
   int rank = 0;
   int ranks = 0;
@@ -101,11 +110,14 @@ int main(int argc, char** argv) {
   int split[3] = {0, 0, 0};
   MPI_Dims_create(ranks, 3, split);
   const int32_t at_rank[3] = {rank % split[0], rank / split[0] % split[1], rank / split[0] / split[1]};
+  const int ghosts = strncmp(argv[3], "star_", 5) == 0;
+  const int is_periodic = strncmp(argv[3], "star_periodic", 13) == 0;
   int32_t first[3];
   int32_t cells[3];
   for (int axis = 0; axis < 3; ++axis) {
-    first[axis] = at_rank[axis] * n / split[axis];
-    cells[axis] = (at_rank[axis] + 1) * n / split[axis] - first[axis];
+    const int32_t begin = at_rank[axis] * n / split[axis];
+    first[axis] = begin - ghosts;
+    cells[axis] = (at_rank[axis] + 1) * n / split[axis] - begin + 2 * ghosts;
   }
 
   array arrays[MOST];
@@ -127,8 +139,8 @@ int main(int argc, char** argv) {
   int wrong = initialize_any(argv[1], &catalyst) != VDI_CATALYST_OK;
   const double h = 1.0 / n;
   const vdi_catalyst_block block = {{cells[0], cells[1], cells[2]},
-                                    {0, 0, 0},
-                                    {0, 0, 0},
+                                    {ghosts, ghosts, ghosts},
+                                    {ghosts, ghosts, ghosts},
                                     {first[0] * h, first[1] * h, first[2] * h},
                                     {h, h, h}};
   wrong += vdi_catalyst_set_blocks(catalyst, 1, &block) != VDI_CATALYST_OK;
@@ -156,10 +168,15 @@ int main(int argc, char** argv) {
         for (int32_t y = 0; y < cells[1]; ++y) {
           for (int32_t x = 0; x < cells[0]; ++x) {
             const int32_t at[3] = {x, y, z};
-            store(&arrays[i], at,
-                  field((first[0] + x + 0.5 + arrays[i].offset[0]) * h,
-                        (first[1] + y + 0.5 + arrays[i].offset[1]) * h,
-                        (first[2] + z + 0.5 + arrays[i].offset[2]) * h, 0.3 * step));
+            double place[3];
+            int outside = 0;
+            for (int axis = 0; axis < 3; ++axis) {
+              outside += at[axis] < ghosts || at[axis] >= cells[axis] - ghosts;
+              place[axis] =
+                  (source_of(first[axis] + at[axis], n, is_periodic) + 0.5 + arrays[i].offset[axis]) * h;
+            }
+            if (outside > 1) continue;
+            store(&arrays[i], at, field(place[0], place[1], place[2], 0.3 * step));
           }
         }
       }

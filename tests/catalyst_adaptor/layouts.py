@@ -1,5 +1,5 @@
 """A field in the layouts of real codes: its pictures are the same as those of an array in order, and none of them is copied on
-the host. Arguments: the case (same, ranks, memory), and the program layouts.c with its launcher."""
+the host. Arguments: the case (same, ranks, ghosts, memory), and the program layouts.c with its launcher."""
 
 import io
 import json
@@ -76,6 +76,17 @@ def ranks():
         assert most <= 2, field
 
 
+def ghosts():
+    """Ghost layers beyond the domain, whose edges and corners are NaN: several ranks make the picture of one."""
+    pictures = {}
+    for field in ("star_mirror", "star_periodic"):
+        pictures[field] = run(field, 32, launcher=ALONE)[0][0]
+        most = difference(pictures[field], run(field, 32)[0][0])
+        print("%s: ranks differ by at most %d/255" % (field, most))
+        assert most <= 2, field
+    assert difference(pictures["star_mirror"], pictures["star_periodic"]) > 20, "the layers don't show"
+
+
 def memory():
     """A copy would take the field's bytes once more. mpirun must not bind the rank to a core, where the device would
     read values in order directly, and those of other layouts from a staging buffer."""
@@ -93,4 +104,4 @@ def memory():
 
 with tempfile.TemporaryDirectory() as folder:
     os.chdir(folder)
-    {"same": same, "ranks": ranks, "memory": memory}[case]()
+    {"same": same, "ranks": ranks, "ghosts": ghosts, "memory": memory}[case]()

@@ -1,5 +1,7 @@
 // Ghost layers: the values between disjoint blocks, wherever the neighbours are.
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <span>
@@ -15,19 +17,29 @@ using comm::Communicator;
 
 namespace {
 
+using Field = std::function<double(const glm::dvec3&)>;
+
 /// A different value at each lattice index, exact in all types used here.
 double marker(const glm::ivec3& index) {
   return index.x + 20 * index.y + 400 * index.z;
 }
 
+template <typename ValueAt = double (*)(const glm::ivec3&)>
 std::vector<Block> decomposed(const synthetic::Lattice& lattice, const glm::ivec3& blocks,
-                              synthetic::Layout layout, const Communicator& world) {
+                              synthetic::Layout layout, const Communicator& world,
+                              ValueAt valueAtIndex = marker) {
   std::vector<Block> mine;
   for (const synthetic::Part& part :
        synthetic::decompose(lattice.size, blocks, layout, lattice.joint, world.size(), 11)) {
-    if (part.owner == world.rank()) mine.push_back(synthetic::makeBlock(lattice, part, marker));
+    if (part.owner == world.rank()) mine.push_back(synthetic::makeBlock(lattice, part, valueAtIndex));
   }
   return mine;
+}
+
+/// The place of the lattice's value with this index.
+glm::dvec3 placeIn(const synthetic::Lattice& lattice, const glm::ivec3& index) {
+  const double half = lattice.joint == synthetic::Joint::Cells ? 0.5 : 0.0;
+  return lattice.origin + (glm::dvec3(index) + half) * lattice.spacing;
 }
 
 glm::ivec3 indexOf(const synthetic::Lattice& lattice, const glm::dvec3& position) {
@@ -132,21 +144,49 @@ TEST_CASE("blocks of one address that differ by strides are blocks of their own"
   CHECK(valueAt(after[1], -1, 1, 1) == 2.0 + 3 + 9);
 }
 
-/// The block with a layer of NaN around it, which its simulation announces but never fills.
-Block withUnsetHalo(const Block& block, bool cells) {
-  const glm::ivec3 dims = block.dims + 2;
-  const auto values = std::make_shared<std::vector<double>>(
-      static_cast<std::size_t>(dims.x * dims.y * dims.z), std::numeric_limits<double>::quiet_NaN());
-  forEachValue(block.stored(), [&](const glm::ivec3& at) {
-    (*values)[IndexBox{glm::ivec3(0), dims}.position(at + 1)] = valueAt(block, at.x, at.y, at.z);
+/// The block with ghost layers on all sides. `halo(index, outside)` gives their values; the index is relative
+/// to the block's first value, and lies outside the block along `outside` axes.
+template <typename Halo>
+Block withHalo(const Block& block, bool cells, int layers, Halo halo) {
+  const glm::ivec3 dims = block.dims + 2 * layers;
+  const IndexBox all{glm::ivec3(0), dims};
+  const auto values = std::make_shared<std::vector<double>>(all.count());
+  forEachValue(all, [&](const glm::ivec3& at) {
+    const glm::ivec3 own = at - layers;
+    int outside = 0;
+    for (int axis = 0; axis < 3; ++axis) outside += own[axis] < 0 || own[axis] >= block.dims[axis] ? 1 : 0;
+    (*values)[all.position(at)] = outside > 0 ? halo(own, outside) : valueAt(block, own.x, own.y, own.z);
   });
-  const glm::dvec3 corner = block.origin - (cells ? 1.5 : 1.0) * block.spacing;
-  const GhostLayers ghosts{glm::ivec3(1), glm::ivec3(1)};
+  const glm::dvec3 corner = block.origin - (layers + (cells ? 0.5 : 0.0)) * block.spacing;
+  const GhostLayers ghosts{glm::ivec3(layers), glm::ivec3(layers)};
   Block wide = cells
                    ? Block::fromCells(dims, corner, block.spacing, ScalarType::F64, values->data(), ghosts)
                    : Block::fromPoints(dims, corner, block.spacing, ScalarType::F64, values->data(), ghosts);
   wide.keepAlive = values;
   return wide;
+}
+
+constexpr double unset = std::numeric_limits<double>::quiet_NaN();
+
+/// Ghost layers that the simulation announces but never fills.
+Block withUnsetHalo(const Block& block, bool cells) {
+  return withHalo(block, cells, 1, [](const glm::ivec3&, int) { return unset; });
+}
+
+/// Ghost layers as a star stencil's exchange leaves them: values straight beside the block are set, and those
+/// at edges and corners are not. They depend on the lattice, not on its division into blocks.
+Block withStarHalo(const Block& block, bool cells, int layers, const Field& field) {
+  return withHalo(block, cells, layers, [&](const glm::ivec3& own, int outside) {
+    return outside > 1 ? unset : field(placeOf(block, own));
+  });
+}
+
+/// The value that interpolation finds at a place of the block's lattice.
+double valueAtPlace(const Block& block, const glm::dvec3& place) {
+  const IndexBox all = block.extended();
+  const glm::ivec3 index(glm::round((place - block.origin) / block.spacing));
+  const glm::ivec3 at = glm::clamp(index, all.lo, all.hi - 1);
+  return valueAt(block, at.x, at.y, at.z);
 }
 
 TEST_CASE("values off points and cells' middles come from the blocks that own them") {
@@ -194,6 +234,86 @@ TEST_CASE("values off points and cells' middles come from the blocks that own th
     CHECK(wrong == 0);
     CHECK(missing == 0);
     if (!halo) CHECK(beyond == 0);  // beyond the domain, the outermost values count
+  }
+}
+
+TEST_CASE("ghost layers beyond the domain, set by a star stencil: many blocks have the values of one") {
+  const Communicator world = Communicator::world();
+  const auto joint = GENERATE(synthetic::Joint::Cells, synthetic::Joint::SharedPoints, synthetic::Joint::Gap);
+  const bool cells = joint == synthetic::Joint::Cells;
+  const int layers = GENERATE(1, 2);
+  const auto parts = GENERATE(glm::ivec3(2, 1, 1), glm::ivec3(4, 3, 2));
+  const synthetic::Lattice lattice{{12, 9, 8}, {1.0, -2.0, 0.0}, {0.5, 1.0, 2.0}, ScalarType::F64, joint};
+  const Field wave = [](const glm::dvec3& p) {
+    return std::sin(1.3 * p.x) * std::cos(0.4 * p.y) + std::sin(0.3 * p.z + 0.2 * p.x * p.y);
+  };
+  const auto exchanged = [&](const Communicator& comm, const glm::ivec3& blocks) {
+    std::vector<Block> mine;
+    const auto value = [&](const glm::ivec3& index) { return wave(placeIn(lattice, index)); };
+    for (const Block& block : decomposed(lattice, blocks, synthetic::Layout::Random, comm, value))
+      mine.push_back(withStarHalo(block, cells, layers, wave));
+    return comm::exchangeGhosts(comm, mine);
+  };
+  const Block whole = exchanged(Communicator::serial(), glm::ivec3(1)).front();
+  const double reach = (cells ? 1.5 : 1.0) + 1e-6;
+  INFO("cells " << cells << ", joint " << static_cast<int>(joint) << ", layers " << layers);
+  for (const Block& block : exchanged(world, parts)) {
+    int wrong = 0;
+    const IndexBox around{glm::ivec3(-3), block.dims + 3};
+    forEachValue(around, [&](const glm::ivec3& at) {
+      const glm::dvec3 place = placeOf(block, at);
+      const glm::dvec3 beyond = reach * block.spacing;
+      if (glm::any(glm::lessThan(place, block.owned.lo - beyond)) ||
+          glm::any(glm::greaterThan(place, block.owned.hi + beyond)))
+        return;
+      // NaN differs from all.
+      if (!(std::abs(valueAtPlace(block, place) - valueAtPlace(whole, place)) < 1e-12)) ++wrong;
+    });
+    CHECK(wrong == 0);
+  }
+}
+
+TEST_CASE("edges and corners of ghost layers beyond the domain continue a linear field") {
+  const Field linear = [](const glm::dvec3& p) { return 3.0 + p.x - 2.0 * p.y + 5.0 * p.z; };
+  const auto joint = GENERATE(synthetic::Joint::Cells, synthetic::Joint::SharedPoints);
+  const bool cells = joint == synthetic::Joint::Cells;
+  const synthetic::Lattice lattice{{5, 4, 6}, {1.0, -2.0, 0.0}, {0.5, 1.0, 2.0}, ScalarType::F64, joint};
+  const Communicator alone = Communicator::serial();
+  const auto value = [&](const glm::ivec3& index) { return linear(placeIn(lattice, index)); };
+  const Block before = decomposed(lattice, glm::ivec3(1), synthetic::Layout::OnOneRank, alone, value).front();
+  const Block block = comm::exchangeGhosts(alone, {withStarHalo(before, cells, 1, linear)}).front();
+  REQUIRE(block.extended() == block.stored());
+  int wrong = 0;
+  forEachValue(block.stored(), [&](const glm::ivec3& at) {
+    wrong += std::abs(valueAt(block, at.x, at.y, at.z) - linear(placeOf(block, at))) < 1e-9 ? 0 : 1;
+  });
+  CHECK(wrong == 0);
+}
+
+TEST_CASE("a ghost value beside two blocks is the same for all, on any ranks") {
+  const Communicator world = Communicator::world();
+  const bool cells = GENERATE(true, false);
+  // An L: the place where the fourth block is missing lies beside two blocks, whose layers differ.
+  const std::vector<glm::dvec3> corners{{3.0, 0.0, 0.0}, {0.0, 3.0, 0.0}, {0.0, 0.0, 0.0}};
+  for (int turn = 0; turn < world.size(); ++turn) {
+    std::vector<Block> mine;
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      if ((static_cast<int>(i) + turn) % world.size() != world.rank()) continue;
+      const glm::ivec3 dims(cells ? 3 : 4);
+      const std::vector<double> values(64, 7.0);
+      const Block block =
+          cells ? Block::fromCells(dims, corners[i], glm::dvec3(1.0), ScalarType::F64, values.data())
+                : Block::fromPoints(dims, corners[i], glm::dvec3(1.0), ScalarType::F64, values.data());
+      mine.push_back(
+          withStarHalo(block, cells, 1, [i](const glm::dvec3&) { return 1.0 + static_cast<double>(i); }));
+    }
+    const glm::dvec3 place = cells ? glm::dvec3(3.5, 3.5, 1.5) : glm::dvec3(4.0, 4.0, 1.0);
+    for (const Block& block : comm::exchangeGhosts(world, mine)) {
+      const double beyond = cells ? 1.5 : 1.0;
+      if (glm::any(glm::greaterThan(place, block.owned.hi + beyond))) continue;
+      // The place lies beside the second block along x, which comes before the first one's y.
+      CHECK(valueAtPlace(block, place) == 2.0);
+    }
   }
 }
 

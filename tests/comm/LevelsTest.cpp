@@ -133,6 +133,26 @@ TEST_CASE("three levels side by side: a linear field has no seams") {
   for (const Block& block : after) CHECK((block.extra.lo + block.extra.hi != glm::ivec3(0)));
 }
 
+TEST_CASE("levels with ghost layers beyond the domain, whose edges are unset: a linear field has no seams") {
+  const Communicator world = Communicator::world();
+  const Kind kind = GENERATE(Kind::Points, Kind::Cells);
+  std::vector<Block> all;
+  for (const Block& block : cubes(kind, {4, 8, 16})) {
+    const auto star = [&block](const glm::dvec3& place) {
+      int outside = 0;
+      for (int axis = 0; axis < 3; ++axis)
+        outside += place[axis] < block.owned.lo[axis] || place[axis] > block.owned.hi[axis] ? 1 : 0;
+      return outside > 1 ? std::numeric_limits<double>::quiet_NaN() : linear(place);
+    };
+    const glm::ivec3 cells(glm::round(block.owned.size() / block.spacing));
+    const Box around{block.owned.lo - block.spacing, block.owned.hi + block.spacing};
+    all.push_back(blockIn(kind, around, cells + 2, ScalarType::F64, star));
+    all.back().owned = block.owned;
+  }
+  const std::vector<Block> after = comm::exchangeGhosts(world, decomposed(all, world));
+  CHECK(worstError(world, after, cube(0.0, 3.0)) < rounding);
+}
+
 TEST_CASE("three levels side by side: a curved field is off by what the coarsest level is off") {
   const Communicator world = Communicator::world();
   const auto curved = [](const glm::dvec3& p) {

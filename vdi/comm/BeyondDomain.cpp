@@ -37,8 +37,10 @@ struct Window {
 
 class Continuation {
  public:
-  Continuation(const Block& block, std::span<const OpenPatch> patches) : block_(block), patches_(patches) {
-    for (const IndexBox& box : windowsOf(block, patches)) addWindow(box);
+  Continuation(const Block& block, const IndexBox& core, const IndexBox& used,
+               std::span<const OpenPatch> patches)
+      : block_(block), core_(core), patches_(patches) {
+    for (const IndexBox& box : windowsOf(block.extended().intersection(used), patches)) addWindow(box);
     for (std::size_t i = 0; i < patches.size(); ++i) {
       const IndexBox& window = windowOf(i).box;
       for (const IndexBox& box : patches[i].open) {
@@ -89,13 +91,13 @@ class Continuation {
 
   /// One box for each patch, or one for all of them if that has fewer values. So the memory grows with the
   /// patches, not with the block.
-  static std::vector<IndexBox> windowsOf(const Block& block, std::span<const OpenPatch> patches) {
+  static std::vector<IndexBox> windowsOf(const IndexBox& all, std::span<const OpenPatch> patches) {
     std::vector<IndexBox> each;
     IndexBox common;
     std::size_t count = 0;
     for (const OpenPatch& patch : patches) {
       const IndexBox around{patch.box.lo - deciding, patch.box.hi + deciding};
-      each.push_back(around.intersection(block.extended()));
+      each.push_back(around.intersection(all));
       common.include(each.back());
       count += each.back().count();
     }
@@ -133,8 +135,8 @@ class Continuation {
     int count = 0;
     for (int axis = 0; axis < 3; ++axis) {
       const int at = place.at[axis];
-      if (at >= 0 && at < block_.dims[axis]) continue;
-      const bool below = at < 0;
+      if (at >= core_.lo[axis] && at < core_.hi[axis]) continue;
+      const bool below = at < core_.lo[axis];
       const int inward = below ? window.box.hi[axis] - 1 - at : at - window.box.lo[axis];
       const std::ptrdiff_t stride = window.strides[static_cast<std::size_t>(axis)];
       if (const auto value = continuedAlong(window, place.position, below ? stride : -stride, inward)) {
@@ -145,7 +147,7 @@ class Continuation {
     return count > 0 ? std::optional(sum / count) : std::nullopt;
   }
 
-  /// `step` leads towards the stored values, where the window has `inward` more values.
+  /// `step` leads towards the core, where the window has `inward` more values.
   static std::optional<double> continuedAlong(const Window& window, std::size_t position, std::ptrdiff_t step,
                                               int inward) {
     std::array<double, deciding> values{};
@@ -163,6 +165,7 @@ class Continuation {
   }
 
   const Block& block_;
+  const IndexBox core_;
   std::span<const OpenPatch> patches_;
   std::vector<Window> windows_;  // one for all patches, or one for each
   std::vector<Place> open_;
@@ -171,8 +174,9 @@ class Continuation {
 
 }  // namespace
 
-void continueBeyondDomain(const Block& block, std::span<const OpenPatch> patches) {
-  Continuation continuation(block, patches);
+void continueBeyondDomain(const Block& block, const IndexBox& core, const IndexBox& used,
+                          std::span<const OpenPatch> patches) {
+  Continuation continuation(block, core, used, patches);
   while (continuation.advance()) {
   }
 }

@@ -1,4 +1,4 @@
-// Values beyond the outermost cells of the domain.
+// Values beyond the outermost known ones of the domain.
 #pragma once
 
 #include <cstddef>
@@ -16,8 +16,9 @@ struct OpenPatch {
   std::vector<IndexBox> open;  // parts of `box`, disjoint
 };
 
-/// Continues a block's values into the open places outside the stored values, along each axis that
-/// leads from an open place back to known values.
+/// Continues a block's values into the open places outside `core`, along each axis that leads from an open
+/// place back to known values. An open place takes the mean over these axes. Places that are beside known
+/// values come first, and the next ones continue from them too.
 ///
 /// Along an axis, the values follow the parabola through the three nearest ones, limited so that a steep edge
 /// or an extremum does not overshoot. A linear field continues linearly. If an axis has fewer than three
@@ -25,9 +26,11 @@ struct OpenPatch {
 ///
 /// Cell values end half a cell before the domain does. If each level kept its outermost value over
 /// that distance, levels of different spacing would show a linear field differently at the domain's
-/// faces.
+/// faces. Edges and corners of ghost layers beyond the domain continue from the layers' faces.
 ///
-/// `patches` are some of the block's, in any order. Masked values of the block are never used.
-void continueBeyondDomain(const Block& block, std::span<const OpenPatch> patches);
+/// `core` are the indices of the stored values without ghost layers. Values outside `used` are never read,
+/// nor are masked values of the block. `patches` are some of the block's, in any order.
+void continueBeyondDomain(const Block& block, const IndexBox& core, const IndexBox& used,
+                          std::span<const OpenPatch> patches);
 
 }  // namespace vdi::comm

@@ -67,6 +67,15 @@ void subtract(std::vector<IndexBox>& boxes, const IndexBox& hole) {
   boxes = std::move(rest);
 }
 
+/// The part of a block's stored values straight beside its core, on both sides along the axis, and the core.
+template <typename AnyBox>
+AnyBox columnOf(const AnyBox& stored, const AnyBox& core, int axis) {
+  AnyBox column = core;
+  column.lo[axis] = stored.lo[axis];
+  column.hi[axis] = stored.hi[axis];
+  return column;
+}
+
 /// A question of one rank to another, or to itself. For each value in `box` of a lattice, it asks for the sum
 /// over those of the value's samples that lie in `clip`, [lo, hi). A value's samples are the middles of its
 /// parts. A block may need hundreds of questions.
@@ -133,6 +142,7 @@ struct Wanted {
   IndexBox box;
   bool keep = false;                    // the caller's ghost values, which stay if no block has better ones
   std::vector<IndexBox> asked;          // parts that other blocks have; they may overlap
+  std::vector<IndexBox> edges;          // parts that blocks store, but at edges of their ghost layers only
   std::size_t copies = 0;               // number of values to copy
   std::shared_ptr<std::byte[]> values;  // values of the block's type
   std::vector<double> sums;             // empty unless some values are means or interpolated
@@ -144,6 +154,8 @@ struct Grid {
   Block block;
   bool cells = false;
   double volume = 0.0;  // volume that a single value represents
+  IndexBox core;        // bounds of the stored values without ghost layers
+  IndexBox used;        // bounds of all values that interpolation uses
   std::vector<Box> owned;
   std::vector<Box> finer;       // parts that finer blocks took over
   std::vector<IndexBox> given;  // its own values
@@ -299,13 +311,15 @@ class LayerExchange {
         grid.volume = entry.valueVolume();
       }
       Grid& grid = grids_[index];
+      grid.core.include(valuesIn(entry.asked, grid.block).intersection(grid.block.stored()));
       const OwnParts& own = parts[i - directory_.firstMine()];
       grid.owned.insert(grid.owned.end(), own.boxes.begin(), own.boxes.end());
       grid.finer.insert(grid.finer.end(), own.finer.begin(), own.finer.end());
     }
     for (Grid& grid : grids_) {
       for (const Box& box : grid.owned) {
-        std::vector<IndexBox> values{valuesIn(box, grid.block).intersection(grid.block.stored())};
+        // A ghost value in a gap that the block has closed is not its own.
+        std::vector<IndexBox> values{valuesIn(box, grid.block).intersection(grid.core)};
         // Points on a finer block's face belong to the finer block.
         for (const Box& finer : grid.finer) subtract(values, valuesIn(finer, grid.block));
         std::erase_if(values, [](const IndexBox& part) { return part.empty(); });
@@ -318,8 +332,9 @@ class LayerExchange {
   /// interpolation.
   static void findWanted(Grid& grid) {
     const IndexBox stored = grid.block.stored();
+    for (const Box& box : grid.owned) grid.used.include(valuesFor(box, grid.block));
     IndexBox all = stored;
-    for (const Box& box : grid.owned) all.include(valuesFor(box, grid.block));
+    all.include(grid.used);
     for (const IndexBox& box : without(all, stored)) grid.wanted.emplace_back().box = box;
     const std::size_t around = grid.wanted.size();
     for (const Box& box : grid.owned) {
@@ -340,54 +355,124 @@ class LayerExchange {
           subtract(inside, masked);
         }
       }
-      for (const IndexBox& values : inside) want(values, true);
+      for (int axis = 0; axis < 3; ++axis) {
+        const IndexBox column = columnOf(stored, grid.core, axis);
+        for (const IndexBox& values : inside) {
+          const IndexBox common = values.intersection(column);
+          if (!common.empty()) want(common, true);
+        }
+        subtract(inside, column);
+      }
+      for (const IndexBox& values : inside) {
+        want(values, false);
+        grid.wanted.back().edges.push_back(values);
+      }
     }
   }
 
   /// Finds the blocks that have the values, the finest first.
   void askFor(std::size_t gridIndex, std::size_t wantedIndex) {
     const Grid& grid = grids_[gridIndex];
-    const bool keep = grid.wanted[wantedIndex].keep;
     const IndexBox values = grid.wanted[wantedIndex].box;
     // The volume that the values represent.
     const Box volume{grid.block.origin + (glm::dvec3(values.lo) - 0.5) * grid.block.spacing,
                      grid.block.origin + (glm::dvec3(values.hi) - 0.5) * grid.block.spacing};
     // The owners of a place come first, the finest first; within a level, blocks with a value there precede
     // those that only close a gap. Owners claim the places of their values. Offsets leave places between
-    // levels that no values represent; the owners of the space claim these. Blocks that only store a value
-    // come last, for places that nobody owns.
+    // levels that no values represent; the owners of the space claim these. Ghost values come last, for
+    // places that nobody owns.
     enum class By { Values, Gap, Space };
     using Claim = std::tuple<bool, std::int32_t, By, std::size_t>;  // Space; level, negative; by; donor
     const bool hasOffset = grid.block.offset != glm::dvec3(0.0);
+    const std::vector<std::size_t> donors = directory_.meeting(volume);
     std::vector<Claim> owners;
-    std::vector<Claim> keepers;
-    for (const std::size_t d : directory_.meeting(volume)) {
+    for (const std::size_t d : donors) {
       const BlockEntry& donor = directory_.entries()[d];
-      if (donor.rank == comm_.rank() && static_cast<std::size_t>(donor.grid) == gridIndex) continue;
+      if (isOf(gridIndex, donor)) continue;
       owners.emplace_back(false, -levelNumbers_[d], By::Values, d);
       if (donor.asked != donor.owned) owners.emplace_back(false, -levelNumbers_[d], By::Gap, d);
       if (hasOffset && levels_.size() > 1) owners.emplace_back(true, -levelNumbers_[d], By::Space, d);
-      if (!donor.masks && !keep) keepers.emplace_back(false, -levelNumbers_[d], By::Values, d);
     }
+    std::sort(owners.begin(), owners.end());
     Remainder left(volume);
-    for (std::vector<Claim>* claims : {&owners, &keepers}) {
-      if (left.empty()) break;
-      std::sort(claims->begin(), claims->end());
-      for (const Claim& claim : *claims) {
-        const auto [last, level, by, index] = claim;
-        const std::size_t d = index;  // a lambda must not capture a structured binding
-        const BlockEntry& donor = directory_.entries()[d];
-        const Box owned = by == By::Values ? donor.asked : donor.owned;
-        const Box box = claims == &keepers ? donor.storedBox()
-                        : by == By::Space  ? owned
-                                           : donor.ofValues(owned);
-        // A margin, so that nothing is lost between faces and places that were computed differently.
-        const glm::dvec3 spare = latticeTolerance * glm::min(donor.spacing, grid.block.spacing);
-        left.subtract({box.lo - spare, box.hi + spare},
-                      [&](const Box& common) { ask(gridIndex, wantedIndex, d, common); });
-        if (left.empty()) break;
+    for (const auto& [last, level, by, d] : owners) {
+      if (left.empty()) return;
+      const BlockEntry& donor = directory_.entries()[d];
+      const Box owned = by == By::Values ? donor.asked : donor.owned;
+      claim(left, gridIndex, d, by == By::Space ? owned : donor.ofValues(owned),
+            [&, donor = d](const Box& common) { ask(gridIndex, wantedIndex, donor, common); });
+    }
+    if (!left.empty()) askForGhosts(gridIndex, wantedIndex, donors, left);
+  }
+
+  bool isOf(std::size_t gridIndex, const BlockEntry& entry) const {
+    return entry.rank == comm_.rank() && static_cast<std::size_t>(entry.grid) == gridIndex;
+  }
+
+  /// Subtracts a donor's box with a margin, so that nothing is lost between faces and places that were
+  /// computed differently.
+  template <typename Visit>
+  void claim(Remainder& left, std::size_t gridIndex, std::size_t donor, const Box& box, Visit visit) const {
+    const glm::dvec3 spare =
+        latticeTolerance * glm::min(directory_.entries()[donor].spacing, grids_[gridIndex].block.spacing);
+    left.subtract({box.lo - spare, box.hi + spare}, visit);
+  }
+
+  /// Finds the blocks that have ghost values at places that nobody owns. Only values straight beside a block
+  /// count. Where layers lie beside two blocks, all ranks choose the same one, however the ranks share the
+  /// blocks: the finest, then the one beside which they lie along the first axis.
+  void askForGhosts(std::size_t gridIndex, std::size_t wantedIndex, std::span<const std::size_t> donors,
+                    Remainder& left) {
+    // Level, negative; axis; lower corner, z first; donor.
+    using Claim = std::tuple<std::int32_t, int, std::array<double, 3>, std::size_t>;
+    std::vector<Claim> claims;
+    const Grid& grid = grids_[gridIndex];
+    const bool keep = grid.wanted[wantedIndex].keep;
+    for (const std::size_t d : donors) {
+      const BlockEntry& donor = directory_.entries()[d];
+      if (isOf(gridIndex, donor) ? !keep : donor.masks) continue;
+      const Box stored = donor.storedBox();
+      const Box core = donor.ofValues(donor.asked);
+      for (int axis = 0; axis < 3; ++axis) {
+        if (stored.lo[axis] < core.lo[axis] || stored.hi[axis] > core.hi[axis])
+          claims.emplace_back(-levelNumbers_[d], axis,
+                              std::array{donor.asked.lo.z, donor.asked.lo.y, donor.asked.lo.x}, d);
       }
     }
+    std::sort(claims.begin(), claims.end());
+    for (const auto& [level, axis, corner, d] : claims) {
+      if (left.empty()) return;
+      const BlockEntry& donor = directory_.entries()[d];
+      Box column = columnOf(donor.storedBox(), donor.ofValues(donor.asked), axis);
+      if (grid.cells && donor.valueVolume() < 0.99 * grid.volume) shrinkToCells(column, axis, grid.block);
+      claim(left, gridIndex, d, column, [&, donor = d](const Box& common) {
+        if (!isOf(gridIndex, directory_.entries()[donor])) ask(gridIndex, wantedIndex, donor, common);
+      });
+    }
+    if (keep) return;
+    for (const std::size_t d : donors) {
+      const BlockEntry& donor = directory_.entries()[d];
+      if (isOf(gridIndex, donor) || donor.masks) continue;
+      claim(left, gridIndex, d, donor.storedBox(),
+            [&](const Box& common) { addEdge(gridIndex, wantedIndex, common); });
+    }
+  }
+
+  /// Leaves out cells of the block that the box covers in part. A mean over that part would lie askew.
+  static void shrinkToCells(Box& box, int axis, const Block& block) {
+    const double spacing = block.spacing[axis];
+    const double first = block.origin[axis] - 0.5 * spacing;
+    box.lo[axis] = first + std::ceil((box.lo[axis] - first) / spacing - indexTolerance) * spacing;
+    box.hi[axis] = first + std::floor((box.hi[axis] - first) / spacing + indexTolerance) * spacing;
+  }
+
+  void addEdge(std::size_t gridIndex, std::size_t wantedIndex, const Box& where) {
+    Grid& grid = grids_[gridIndex];
+    Wanted& wanted = grid.wanted[wantedIndex];
+    Request places{
+        {0, 0, 0, glm::ivec3(0), wanted.box, glm::ivec3(1), where}, grid.block.origin, grid.block.spacing};
+    places.trim();
+    if (!places.box.empty()) wanted.edges.push_back(places.box);
   }
 
   void ask(std::size_t gridIndex, std::size_t wantedIndex, std::size_t donorIndex, const Box& where) {
@@ -466,7 +551,7 @@ class LayerExchange {
       }
       if (wanted.copies != box.count()) {
         fillWithOwn(grid, wanted);
-        if (continued && box.intersection(stored).empty()) addOpen(grid, wanted);
+        addOpen(grid, wanted, continued && box.intersection(stored).empty());
       }
       patches->push_back({box, std::shared_ptr<const void>(wanted.values, wanted.values.get())});
     }
@@ -477,16 +562,21 @@ class LayerExchange {
   /// outermost values extend to the faces, as in ParaView's own volume rendering.
   bool continuesBeyondDomain(const Grid& grid) const { return grid.cells && levels_.size() > 1; }
 
-  static void addOpen(Grid& grid, const Wanted& wanted) {
-    std::vector<IndexBox> open{wanted.box};
+  /// Adds the places of `wanted` that no block has: all of them, or those at edges only.
+  static void addOpen(Grid& grid, const Wanted& wanted, bool all) {
+    std::vector<IndexBox> open = all ? std::vector<IndexBox>{wanted.box} : wanted.edges;
+    for (IndexBox& part : open) part = part.intersection(wanted.box).intersection(grid.used);
     for (const IndexBox& asked : wanted.asked) subtract(open, asked);
+    std::erase_if(open, [](const IndexBox& part) { return part.empty(); });
     if (!open.empty()) grid.open.push_back({wanted.box, wanted.values.get(), std::move(open)});
   }
 
   /// Other levels interpolate in the continued values, which depend on received ones. So this runs before
   /// values beyond the stored ones are read, and after the last round.
   static void continueBeyondDomain(Grid& grid) {
-    if (grid.stale && !grid.open.empty()) comm::continueBeyondDomain(grid.block, grid.open);
+    if (grid.stale && !grid.open.empty()) {
+      comm::continueBeyondDomain(grid.block, grid.core, grid.used, grid.open);
+    }
     grid.stale = false;
   }
 
@@ -607,7 +697,7 @@ class LayerExchange {
       const IndexBox tile = tiles[i];
       request.placesIn(tile, places_);
       sampler_.prepare(grid.block, places_);
-      if (sampler_.leavesStored()) continueBeyondDomain(grid);
+      if (sampler_.leaves(grid.core)) continueBeyondDomain(grid);
       sampler_.gather();
       forEachIndex(tile, [&](const glm::ivec3& at) {
         const double sum = sampler_.sum(at - tile.lo);

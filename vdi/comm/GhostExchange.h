@@ -34,15 +34,20 @@ std::vector<Block> settleOwnership(const Communicator& comm, std::vector<Block> 
 /// - for cell data, the mean over a finer neighbour's values in the volume that it represents;
 /// - else interpolated trilinearly from the neighbour's values, after those around the neighbour's own box
 ///   have been found.
-/// Integers are rounded. Where no block owns a place, a neighbour's ghost value is used if that neighbour has
-/// no masked values. Otherwise the nearest own value is repeated. Sides without any neighbour get no layer.
-///
-/// Cells of several levels. Where no block has a value, the block's own values are continued
-/// (BeyondDomain.h), so that all levels show the same field at the domain's faces.
+/// Integers are rounded. Where no block has a value, the nearest own value is repeated. Sides without any
+/// neighbour get no layer.
 ///
 /// Stored values outside the owned box. The caller's ghost layers count only where no block owns the place.
 /// Elsewhere the owner's values replace them if interpolation would mix them with the block's own. `masked`
-/// values are replaced likewise.
+/// values are replaced likewise. Beyond the domain,
+/// - ghost values straight beside a block (outside it along one axis only) count for all blocks. Where they
+///   lie straight beside several blocks, all ranks take the finest block's; within a level, the one beside
+///   which they lie along x, then y, then z. Other blocks take none from a block that has masked values;
+/// - ghost values at edges and corners are never interpolated, since many codes leave them unset. They are
+///   continued from the layers' faces (BeyondDomain.h), for one block as for many.
+///
+/// Cells of several levels. Where no block has a value, the block's own values are continued
+/// (BeyondDomain.h), so that all levels show the same field at the domain's faces.
 ///
 /// Scalar types that differ. All blocks become f32, or f64 if one of them is u32, i32 or f64. Blocks of other
 /// types are copied.

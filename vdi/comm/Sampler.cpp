@@ -28,10 +28,11 @@ void Sampler::prepare(const Block& block, const std::array<SamplePlaces, 3>& pla
   }
 }
 
-bool Sampler::leavesStored() const {
+bool Sampler::leaves(const IndexBox& box) const {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::vector<int>& own = indices_[axis];
-    if (own.front() < 0 || own.back() >= block_->dims[static_cast<int>(axis)]) return true;
+    const auto a = static_cast<int>(axis);
+    if (own.front() < box.lo[a] || own.back() >= box.hi[a]) return true;
   }
   return false;
 }

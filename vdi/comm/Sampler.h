@@ -27,8 +27,8 @@ class Sampler {
  public:
   /// Finds the values that the samples need. `block` must stay until the next call.
   void prepare(const Block& block, const std::array<SamplePlaces, 3>& places);
-  /// Whether the samples need values in layers beyond the stored ones.
-  bool leavesStored() const;
+  /// Whether the samples need values outside the box.
+  bool leaves(const IndexBox& box) const;
   /// Reads these values. Later sums use the values that the block has now.
   void gather() { values_.gather(*block_, indices_); }
 
