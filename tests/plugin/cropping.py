@@ -40,6 +40,19 @@ for name, shade in (("unshaded", 0), ("shaded", 1)):
     vdi_bounds = np.array(image.GetDataInformation().GetBounds())
     write_png("cropping_%s.png" % name, np.hstack([ours, theirs]))
 
+# Without a box, Cropping begins with the whole input.
+alone = simple.GetRepresentation(source, view)
+alone.UseCropping = 0
+uncropped = vdi_filter(source, view, "CELLS", "field", 2.0)
+expected = picture(uncropped)
+uncropped.Cropping = 1
+seen = picture(uncropped)
+check(seen is not None and expected.max() > 100 and np.abs(seen.astype(int) - expected).max() <= 1,
+      "Cropping without a box shows the whole input")
+check(np.allclose(uncropped.GetDataInformation().GetBounds(), source.GetDataInformation().GetBounds()),
+      "Cropping without a box leaves the outline")
+alone.UseCropping = 1
+
 # Properties that were set before the first update stay, and so do those that belong to them.
 representation = simple.GetRepresentation(source, view)
 representation.BlendMode = "Isosurface"

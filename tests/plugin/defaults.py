@@ -158,6 +158,15 @@ check(range_of("preset") == [0, 4, 0, 2], "a preset waits for the range, opaciti
 check(not errors_of(filter_of(source, "POINTS", "velocity", Component=0)), "a component is rendered")
 check(range_of("velocity") == [-1, 3, -1, 3], "the map of a component has the component's range, not the magnitude's")
 
+# A VDI's output has field arrays, one of them with the name of the array. They aren't offered.
+made = simple.VolumetricDepthImage(Input=source, Resolution=[16, 12])
+made.UpdatePipeline()
+simple.SetActiveSource(made)
+second = simple.VolumetricDepthImage(Input=source)
+check(second.SelectInputScalars[0] == "POINTS" and list(second.SelectInputScalars) == list(made.SelectInputScalars),
+      "a filter that is made while a VDI is active begins with an array of the input: %s" % second.SelectInputScalars)
+simple.SetActiveSource(None)
+
 # Data without arrays.
 bare = vtkImageData()
 bare.SetDimensions(5, 5, 5)

@@ -34,6 +34,11 @@ def use():
     image.CameraPosition, image.CameraFocalPoint = [45, 32, 52], [0, 0, 0]
     image.ScalarOpacityUnitDistance = 3
     image.UpdatePipeline()
+    cropping = image.SMProxy.GetProperty("Cropping")
+    cropping.SetUncheckedElement(0, 1)  # what the panel does before Apply
+    pvtest.check(list(image.CroppingBox) == [-10, 10] * 3,
+                 "a tick at Cropping shows the input's bounds: %s" % list(image.CroppingBox))
+    cropping.ClearUncheckedElements()
     rendered = simple.RenderVDI(Input=image)
     rendered.UseOriginalCamera = 1
     rendered.Azimuth = 15

@@ -176,6 +176,11 @@ std::array<int, 2> resolutionOf(vtkSMViewProxy* view) {
   return {scaled(width), scaled(height)};
 }
 
+/// Whether these are the bounds of a cropping box that has been set.
+bool isSet(const std::vector<double>& box) {
+  return std::ranges::any_of(box, [](double bound) { return bound != 0.0; });
+}
+
 }  // namespace
 
 vtkStandardNewMacro(vtkSMVDIGeneratorProxy);
@@ -508,9 +513,21 @@ vdi::Box vtkSMVDIGeneratorProxy::ShownBounds() {
   data->GetBounds(bounds);
   const vdi::Box whole = box(bounds);
   if (vtkSMPropertyHelper(this, "Cropping").GetAsInt() == 0) return whole;
-  const vdi::Box cropped =
-      whole.intersection(box(vtkSMPropertyHelper(this, "CroppingBox").GetDoubleArray().data()));
+  const std::vector<double> set = vtkSMPropertyHelper(this, "CroppingBox").GetDoubleArray();
+  if (!isSet(set)) return whole;
+  const vdi::Box cropped = whole.intersection(box(set.data()));
   return cropped.empty() ? whole : cropped;
+}
+
+void vtkSMVDIGeneratorProxy::BeginCropping() {
+  if (vtkSMUncheckedPropertyHelper(this, "Cropping").GetAsInt() == 0 ||
+      isSet(vtkSMUncheckedPropertyHelper(this, "CroppingBox").GetDoubleArray()))
+    return;
+  vtkPVDataInformation* data = this->InputInformation();
+  if (data == nullptr) return;
+  double bounds[6];
+  data->GetBounds(bounds);
+  if (bounds[0] <= bounds[1]) vtkSMPropertyHelper(this, "CroppingBox").Set(bounds, 6);
 }
 
 double vtkSMVDIGeneratorProxy::DegreesFrom(vtkSMRenderViewProxy* view) {

@@ -68,6 +68,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// tell it from a script's choice.
   void TakeArrayFromView();
 
+  /// Sets CroppingBox to the input's bounds, for the panel to show, if Cropping is ticked, applied or not,
+  /// and no box has been set. UpdateVTKObjects sends them.
+  void BeginCropping();
+
   /// Makes the next update count as the first again. Call it when a user undoes the first Apply.
   void Forget();
 

@@ -190,14 +190,15 @@ vdi::Blending vtkVDIGenerator::CurrentBlending() const {
   if (blending.mode != vdi::BlendMode::Composite && !this->PictureOnly)
     throw vdi::Error(vdi::ErrorCode::InvalidArgument,
                      "a VDI holds only composite blending. Choose Composite as Blend Mode, or Picture Only "
-                     "(PictureOnly) for a picture of this mode without a VDI");
+                     "(PictureOnly, an advanced property) for a picture of this mode without a VDI");
   return blending;
 }
 
 vdi::Region vtkVDIGenerator::CurrentRegion() const {
   vdi::Region region;
   const double* b = this->CroppingBox;
-  if (this->Cropping) region.box = {{b[0], b[2], b[4]}, {b[1], b[3], b[5]}};
+  const bool isSet = std::any_of(b, b + 6, [](double bound) { return bound != 0.0; });
+  if (this->Cropping && isSet) region.box = {{b[0], b[2], b[4]}, {b[1], b[3], b[5]}};
   for (const std::array<double, 6>& plane : this->ClippingPlanes)
     region.planes.push_back({{plane[0], plane[1], plane[2]}, {plane[3], plane[4], plane[5]}});
   return region;

@@ -102,8 +102,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   ///@{
   /**
    * The shown part of the volume (vdi::Region): with Cropping (default off), the part in the box, given by
-   * the lowest and highest x, y and z in world coordinates. Of a clipping plane's two sides, the one to which
-   * its normal points is shown.
+   * the lowest and highest x, y and z in world coordinates; all 0 (the default) mean the whole scene. Of a
+   * clipping plane's two sides, the one to which its normal points is shown.
    */
   vtkSetMacro(Cropping, bool);
   vtkSetVector6Macro(CroppingBox, double);
@@ -248,7 +248,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   std::vector<double> Settings;  // [vdi::settingsTable().size()]
   std::vector<std::array<double, 6>> Lights;
   bool Cropping = false;
-  double CroppingBox[6] = {0.0, 1.0, 0.0, 1.0, 0.0, 1.0};
+  double CroppingBox[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
   std::vector<std::array<double, 6>> ClippingPlanes;
   int BlendMode = 0;
   std::vector<double> IsosurfaceValues;

@@ -62,6 +62,8 @@ pqVDIRegenerator::pqVDIRegenerator(pqPipelineSource* source) : QObject(source), 
     pqCoreUtilities::connect(source->getProxy()->GetProperty(name), vtkCommand::ModifiedEvent, this,
                              SLOT(autoChanged()));
   }
+  pqCoreUtilities::connect(source->getProxy()->GetProperty("Cropping"),
+                           vtkCommand::UncheckedPropertyModifiedEvent, this, SLOT(croppingChanged()));
   if (pqUndoStack* undo = pqApplicationCore::instance()->getUndoStack()) {
     this->connect(undo, &pqUndoStack::undone, this, &pqVDIRegenerator::leaveToUser);
     this->connect(undo, &pqUndoStack::redone, this, &pqVDIRegenerator::leaveToUser);
@@ -301,6 +303,11 @@ void pqVDIRegenerator::autoChanged() {
   this->IsAuto = on;
   pqView* active = pqActiveObjects::instance().activeView();
   this->setAutoView(on && active != nullptr && this->isShownIn(active) ? active : nullptr);
+}
+
+/// The panel's box begins with the input's bounds, as soon as a user ticks Cropping.
+void pqVDIRegenerator::croppingChanged() {
+  this->generator()->BeginCropping();
 }
 
 /// After an undo, Auto leaves the viewpoint alone until the camera moves again.

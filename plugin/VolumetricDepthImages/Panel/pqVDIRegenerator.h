@@ -53,6 +53,7 @@ class pqVDIRegenerator : public QObject {
   Q_SLOT void look();
   Q_SLOT void lookAtViews();
   Q_SLOT void autoChanged();
+  Q_SLOT void croppingChanged();
   Q_SLOT void leaveToUser();
   Q_SLOT void stateChanged();
   Q_SLOT void viewAdded(pqView* view);
