@@ -41,14 +41,11 @@ void encodeFrame(const Vdi& vdi, std::uint32_t id, Clock::time_point made,
   // A coarse level has too few chunks to keep all cores busy, so all are made side by side.
   frame.levels.resize(factors.size());
   eachInParallel(factors.size(), [&](std::size_t i) { frame.levels[i] = levelOf(thinned(vdi, factors[i])); });
-  if (!factors.empty()) {
-    take(std::make_shared<Frame>(frame));
-    std::optional<std::vector<std::byte>> whole = io::encodeWhile(vdi, goesOn);
-    if (!whole) return;
-    frame.levels.push_back(levelOf(*std::move(whole), vdi));
-  } else {
-    frame.levels.push_back(levelOf(vdi));
-  }
+  if (!factors.empty()) take(std::make_shared<Frame>(frame));
+  std::optional<std::vector<std::byte>> whole =
+      io::encodeWhile(vdi, [&] { return factors.empty() || goesOn(); });
+  if (!whole) return;
+  frame.levels.push_back(levelOf(*std::move(whole), vdi));
   take(std::make_shared<Frame>(std::move(frame)));
 }
 
