@@ -9,6 +9,7 @@ from paraview.modules.vtkRemotingServerManager import vtkSMProxyManager, vtkSMUn
 from pvtest import *  # noqa: F403
 
 SIZE = [96, 72]
+FIELD = servermanager.GetAssociationFromString("FIELD")
 
 # x is in [-1, 1] along the first axis; `scale` moves the second ball's values.
 SCRIPT = """
@@ -190,6 +191,32 @@ simple.Render(view)
 check(shown.LookupTable == image.LookupTable and list(shown.ColorArrayName) == ["FIELD", "a"], "the legend follows the array")
 check(simple.GetScalarBar(image.LookupTable, view).Visibility == 1 and bar.Visibility == 0,
       "the new array's scalar bar replaces the other")
+
+# The toolbar's box of components changes the map, and then fits it to the range that the VDI has.
+image.SelectInputScalars = ["POINTS", "velocity"]
+simple.Render(view)
+bar = simple.GetScalarBar(image.LookupTable, view)
+for name, component, ends in (("Z", 2, [-3, 3]), ("X", 0, [-1, 1]), ("Magnitude", -1, [0, round(14 ** 0.5, 4)])):
+    shown.SetScalarColoring("velocity", FIELD, component)
+    shown.RescaleTransferFunctionToDataRange(False, False)
+    check(image.Component == component and range_of(image.LookupTable) == ends,
+          "the VDI shows the component that its map names: %s, %s" % (image.Component, range_of(image.LookupTable)))
+    check(bar.ComponentTitle == name, "the scalar bar names component %s: %s" % (name, bar.ComponentTitle))
+    expected = fresh_picture(ball, "velocity", view, Component=component,
+                             ScalarOpacityUnitDistance=image.ScalarOpacityUnitDistance)
+    check(np.abs(picture(image).astype(int) - expected).max() <= 1, "component %s looks as in a new filter" % name)
+image.Component = 1
+check(bar.ComponentTitle == "Y", "the scalar bar follows Component: %s" % bar.ComponentTitle)
+image.LookupTable.VectorMode = "Magnitude"
+check(image.Component == -1, "Component follows a script's map: %s" % image.Component)
+image.LookupTable.AutomaticRescaleRangeMode = "Never"
+before = range_of(image.LookupTable)
+image.LookupTable.VectorMode = "Component"
+check(image.Component == 1 and range_of(image.LookupTable) == before, "a map that must keep its range keeps it")
+image.LookupTable.AutomaticRescaleRangeMode = "Grow and update on 'Apply'"
+image.SelectInputScalars = ["POINTS", "a"]
+image.Component = -1
+simple.Render(view)
 shown.SetRepresentationType("Outline")
 check(not shown.ColorArrayName[1], "a VDI that is shown as Outline isn't coloured by the array")
 image.SelectInputScalars = ["POINTS", "velocity"]

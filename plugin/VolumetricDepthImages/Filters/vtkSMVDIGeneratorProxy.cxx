@@ -1,6 +1,7 @@
 #include "vtkSMVDIGeneratorProxy.h"
 
 #include <vtkCamera.h>
+#include <vtkClientServerStream.h>
 #include <vtkCommand.h>
 #include <vtkCommunicator.h>
 #include <vtkDataObject.h>
@@ -176,6 +177,25 @@ std::array<int, 2> resolutionOf(vtkSMViewProxy* view) {
   return {scaled(width), scaled(height)};
 }
 
+/// The component that a map's legends name.
+int componentNamedBy(vtkSMProxy* map) {
+  if (map->GetProperty("VectorMode") == nullptr) return vdi::magnitude;
+  const bool isOne = vtkSMPropertyHelper(map, "VectorMode").GetAsInt() == vtkScalarsToColors::COMPONENT;
+  return isOne ? vtkSMPropertyHelper(map, "VectorComponent").GetAsInt() : vdi::magnitude;
+}
+
+/// Whether ParaView may fit the map to the data.
+bool mayRescale(vtkSMProxy* map) {
+  return vtkSMPropertyHelper(map, "AutomaticRescaleRangeMode", true).GetAsInt() !=
+         vtkSMTransferFunctionManager::NEVER;
+}
+
+/// The proxy in that property; null if there is none.
+vtkSMProxy* proxyIn(vtkSMProxy* owner, const char* property) {
+  const vtkSMPropertyHelper helper(owner, property, true);
+  return helper.GetNumberOfElements() > 0 ? helper.GetAsProxy() : nullptr;
+}
+
 /// Whether these are the bounds of a cropping box that has been set.
 bool isSet(const std::vector<double>& box) {
   return std::ranges::any_of(box, [](double bound) { return bound != 0.0; });
@@ -229,6 +249,7 @@ void vtkSMVDIGeneratorProxy::UpdatePipeline(double time) {
 
 void vtkSMVDIGeneratorProxy::UpdateVTKObjects() {
   this->Superclass::UpdateVTKObjects();
+  this->WatchMap();
   // Where each rank has a client, only some of their scripts may set this property. The ranks meet in the
   // next update, or when a view is drawn.
   if (this->Taken && !this->Choosing && ranksWithClients() == nullptr) this->FollowArray();
@@ -251,6 +272,7 @@ void vtkSMVDIGeneratorProxy::TakeWhatIsNotSet(std::optional<double> time) {
     this->WatchViews();
     if (!this->MeetRanks(ranks, time)) return;
     if (this->Taken) this->FollowArray();
+    if (std::exchange(this->FollowsMap, false)) this->FollowMap();
   }
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "what the view shows");
   this->TakeFromView();
@@ -281,7 +303,8 @@ bool vtkSMVDIGeneratorProxy::MeetRanks(vtkMultiProcessController* ranks, std::op
   const Subject now = this->CurrentSubject();
   const double subject =
       identityOf(now.Array + '\n' + std::to_string(now.Association) + '\n' + std::to_string(now.Component));
-  const bool isNew = !this->Taken || !this->Shown || now != *this->Shown || this->LacksLookupTable();
+  const bool isNew =
+      !this->Taken || !this->Shown || now != *this->Shown || this->LacksLookupTable() || this->FollowsMap;
   enum { Highest, Lowest, New, Changed, Unchanged };
   std::array<double, 5> all{subject, -subject, isNew ? 1.0 : 0.0, this->NeedsUpdate ? 1.0 : 0.0,
                             this->NeedsUpdate ? 0.0 : 1.0};
@@ -372,6 +395,68 @@ void vtkSMVDIGeneratorProxy::FollowArray() {
     this->ChooseLookupTable(std::nullopt, &before);
   }
   this->Superclass::UpdateVTKObjects();
+  this->WatchMap();
+  double range[2];
+  vtkSMProxy* map = proxyIn(this, "LookupTable");
+  if (map != nullptr && now.Array == before.Array && now.Component != before.Component &&
+      this->RangeOfScalars(now.Array.c_str(), now.Association, std::nullopt, range))
+    this->AnnounceComponent(map, range);
+}
+
+void vtkSMVDIGeneratorProxy::WatchMap() {
+  vtkSMProxy* map = proxyIn(this, "LookupTable");
+  if (map == this->WatchedMap) return;
+  if (this->WatchedMap != nullptr) this->WatchedMap->RemoveObserver(this->MapObserver);
+  this->WatchedMap = map;
+  if (map == nullptr) return;
+  this->NamedComponent = componentNamedBy(map);
+  this->MapObserver = map->AddObserver(vtkCommand::UpdateEvent, this, &vtkSMVDIGeneratorProxy::MapUpdated);
+}
+
+void vtkSMVDIGeneratorProxy::MapUpdated() {
+  const int named = componentNamedBy(this->WatchedMap);
+  if (std::exchange(this->NamedComponent, named) == named || this->Choosing || !this->Taken) return;
+  if (ranksWithClients() != nullptr) {
+    this->FollowsMap = true;  // the number of components is known once the ranks have met
+  } else {
+    this->FollowMap();
+  }
+}
+
+void vtkSMVDIGeneratorProxy::FollowMap() {
+  const Subject before = this->CurrentSubject();
+  const int components = this->ComponentsOf(before.Array, before.Association);
+  if (components < 2 || this->NamedComponent >= components || this->NamedComponent == before.Component)
+    return;
+  const Set choosing(this->Choosing);
+  SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "the component that the map names");
+  vtkSMPropertyHelper(this, "Component").Set(this->NamedComponent);
+  this->Superclass::UpdateVTKObjects();
+  this->Shown = this->CurrentSubject();
+  double range[2];
+  if (!this->RangeOfScalars(before.Array.c_str(), before.Association, std::nullopt, range)) return;
+  vtkSMProxy* map = this->WatchedMap;
+  if (mayRescale(map)) {
+    vtkSMProxy* opacity = proxyIn(this, "ScalarOpacityFunction");
+    if (opacity == nullptr) opacity = proxyIn(map, "ScalarOpacityFunction");
+    vtkSMTransferFunctionProxy::RescaleTransferFunction(map, range[0], range[1]);
+    if (opacity != nullptr) vtkSMTransferFunctionProxy::RescaleTransferFunction(opacity, range[0], range[1]);
+  }
+  this->AnnounceComponent(map, range);
+}
+
+void vtkSMVDIGeneratorProxy::AnnounceComponent(vtkSMProxy* map, const double range[2]) {
+  const Subject now = this->CurrentSubject();
+  vtkClientServerStream stream;
+  stream << vtkClientServerStream::Invoke << VTKOBJECT(this) << "AnnounceRange" << now.Array.c_str()
+         << this->ComponentsOf(now.Array, now.Association) << now.Component << range[0] << range[1]
+         << vtkClientServerStream::End;
+  this->ExecuteStream(stream);
+  this->InvalidateDataInformation();
+  // Legends of the phase name no component.
+  vtkPVArrayInformation* array =
+      this->GetDataInformation(0)->GetArrayInformation(now.Array.c_str(), vtkDataObject::FIELD);
+  if (array != nullptr) vtkSMTransferFunctionProxy::UpdateScalarBarsComponentTitle(map, array);
 }
 
 bool vtkSMVDIGeneratorProxy::HasMapOf(const std::string& name) {
@@ -674,8 +759,7 @@ bool vtkSMVDIGeneratorProxy::NameComponent(vtkSMProxy* map, const std::string& n
   mode.Set(component < 0 ? vtkScalarsToColors::MAGNITUDE : vtkScalarsToColors::COMPONENT);
   if (component >= 0) number.Set(component);
   map->UpdateVTKObjects();
-  return vtkSMPropertyHelper(map, "AutomaticRescaleRangeMode", true).GetAsInt() !=
-         vtkSMTransferFunctionManager::NEVER;
+  return mayRescale(map);
 }
 
 vtkSMProxy* vtkSMVDIGeneratorProxy::MapInView(const std::string& name, int association) {

@@ -19,6 +19,8 @@
  * After the first update, another array, component or input takes its own map as soon as it is sent
  * (UpdateVTKObjects). So the next update finds it, whether it is a view's or a writer's. The proxy replaces
  * only the map of the previous array. Another input brings its unit distance, unless a user has set one.
+ * Conversely, Component follows the map: if ParaView's toolbar or a script makes the map name another
+ * component, the filter shows that one.
  *
  * If each rank has a client (pvbatch --symmetric, Catalyst), the next view that is drawn, or the next update
  * of the proxy or of a writer downstream, does all this: the ranks meet there, and each script may set other
@@ -156,6 +158,14 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// other array, component or input.
   void ChooseLookupTable(std::optional<double> time, const Subject* before);
   void FollowArray();
+  /// Observes the map that is set.
+  void WatchMap();
+  void MapUpdated();
+  /// Shows the component that the map names. Where each rank has a client, call it after GatherInput.
+  void FollowMap();
+  /// Fits the legends of the map, and the range of the output that ParaView knows, to the component that is
+  /// set, ahead of the next update.
+  void AnnounceComponent(vtkSMProxy* map, const double range[2]);
   void TakeUnitDistance();
   /// Whether the map that is set belongs to the array, and isn't a user's choice.
   bool HasMapOf(const std::string& name);
@@ -180,6 +190,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   struct InputOfRanks;
   std::unique_ptr<InputOfRanks> OfRanks;  // if each rank has a client, and the last update needed it
   std::vector<vtkWeakPointer<vtkSMProxy>> Watched;  // the views that BeforeRender observes
+  vtkWeakPointer<vtkSMProxy> WatchedMap;            // the map that MapUpdated observes
+  unsigned long MapObserver = 0;                    // its observer there
+  int NamedComponent = -1;                          // the component that it named last
+  bool FollowsMap = false;                          // whether the ranks' next meeting calls FollowMap
 };
 
 #endif

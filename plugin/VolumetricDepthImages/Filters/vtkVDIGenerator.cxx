@@ -550,6 +550,15 @@ void vtkVDIGenerator::GiveEarlier(vtkImageData* output) {
   }
 }
 
+void vtkVDIGenerator::AnnounceRange(const char* array, int components, int component, double low,
+                                    double high) {
+  vtkImageData* output = this->GetOutput();
+  if (!this->IsRoot() || output == nullptr) return;
+  if (output->GetFieldData()->GetAbstractArray(array) == nullptr) return;
+  const vdi::ScalarArray shown{.name = array, .components = components, .component = component};
+  pv::setShownValues(output, shown, std::array{low, high});
+}
+
 pv::Origin vtkVDIGenerator::OriginOf(vtkDataObject* input) {
   pv::Origin origin;
   if (vtkInformation* array = this->GetInputArrayInformation(0)) {

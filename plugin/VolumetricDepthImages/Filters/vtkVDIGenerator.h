@@ -152,6 +152,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkImageAlgorithm
   /// than 0.
   vtkGetVectorMacro(LastVdi, double, 17);
 
+  /// Gives the output the range of another component of its array, ahead of the VDI that will show it.
+  /// ParaView fits a map to the output's range as soon as a user has chosen a component.
+  void AnnounceRange(const char* array, int components, int component, double low, double high);
+
   ///@{
   /**
    * These functions give a window a new VDI without waiting. After Hold, changed maps and properties don't
