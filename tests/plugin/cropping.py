@@ -84,6 +84,26 @@ check(ssim(viewed, ours) >= 0.97,
       "clipped views of the whole VDI show about what the box shows: SSIM %.4f" % ssim(viewed, ours))
 write_png("cropping_viewed.png", np.hstack([viewed, ours]))
 
+# The representation VDI has such planes, too.
+simple.HideAll(view)
+display = simple.Show(whole, view)
+display.SetRepresentationType("VDI")
+display.VDIClippingPlanes = planes
+in_view = screenshot(view, None, list(view.ViewSize))
+check(np.abs(in_view.astype(int) - viewed).max() <= 2, "a view with clipping planes shows what Render VDI shows")
+with Messages("ErrorEvent") as said:
+    display.VDIClippingPlanes = planes[:6] + [0, 0, 0, 0, 0, 0]
+half = screenshot(view, None, list(view.ViewSize))
+check(len(said) == 1 and "normal" in said[0], "a plane without a normal is an error: %s" % " | ".join(said))
+expected = picture(simple.RenderVDI(Input=whole, UseOriginalCamera=1, ClippingPlanes=planes[:6]))
+check(np.abs(half.astype(int) - expected).max() <= 2, "the other plane still counts")
+display.VDIClippingPlanes = []
+unclipped = screenshot(view, None, list(view.ViewSize))
+expected = picture(simple.RenderVDI(Input=whole, UseOriginalCamera=1))
+check(np.abs(unclipped.astype(int) - expected).max() <= 2, "without planes, the view shows the whole VDI")
+simple.Hide(whole, view)
+simple.Show(source, view)
+
 # Modes that the filter can't show.
 simple.SetActiveView(view)
 for mode in ("Slice", "Composite"):

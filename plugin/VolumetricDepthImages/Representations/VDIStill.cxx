@@ -41,6 +41,7 @@ void VDIStill::make(vdi::VdiRenderer& renderer) {
   std::vector<float> ends(hasObjects ? view_.window.size() : 0);
   if (hasObjects) depthsOf(view_.matrices, view_.window, view_.size, view_.size, ends);
   pixels_.resize(view_.window.size());
+  renderer.setClipPlanes(view_.planes);
   int rows = tileRows;
   for (int row = 0; row < view_.size.y && !isDropped_;) {
     if (Clock::now() < restEnd_.load()) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "VDIView.h"
+#include "vdi/core/Region.h"
 #include "vdi/pipeline/VdiRenderer.h"
 
 namespace pv {
@@ -19,6 +20,7 @@ struct StillView {
   ViewMatrices matrices;
   glm::ivec2 size;
   vdi::Reconstruction reconstruction;
+  std::vector<vdi::ClipPlane> planes;
   std::vector<float> window;  // [size.y][size.x], the depth buffer
 
   bool operator==(const StillView&) const = default;

@@ -28,6 +28,7 @@
 #include "VDIView.h"
 #include "vdi/core/Camera.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Region.h"
 #include "vdi/core/Viewpoint.h"
 #include "vdi/pipeline/VdiRenderer.h"
 
@@ -79,6 +80,7 @@ struct vtkVDIProp::Internals {
   Attempt Rough;                   // the attempt whose full picture loses every device
   std::array<double, 6> Bounds{};  // the last result of GetBounds
   bool IsPeeled = false;           // this frame peels volumes
+  std::vector<vdi::ClipPlane> Planes;
 
   pv::VDINotices Notices;
   std::string Said;  // the last text reported as an error
@@ -114,7 +116,28 @@ void vtkVDIProp::PrintSelf(ostream& os, vtkIndent indent) {
   os << indent << "Reconstruction: " << this->Reconstruction << "\n"
      << indent << "FrameRate: " << this->FrameRate << "\n"
      << indent << "Opacity: " << this->Opacity << "\n"
+     << indent << "ClippingPlanes: " << this->Internal->Planes.size() << "\n"
      << indent << "Problem: " << this->Internal->Notices.problem() << "\n";
+}
+
+void vtkVDIProp::AddClippingPlane(double originX, double originY, double originZ, double normalX,
+                                  double normalY, double normalZ) {
+  std::vector<vdi::ClipPlane> planes = this->Internal->Planes;
+  planes.push_back({{originX, originY, originZ}, {normalX, normalY, normalZ}});
+  try {
+    vdi::validate(vdi::Region{.box = std::nullopt, .planes = planes});
+  } catch (const vdi::Error& error) {
+    vtkErrorMacro(<< error.what());
+    return;
+  }
+  this->Internal->Planes = std::move(planes);
+  this->Modified();
+}
+
+void vtkVDIProp::RemoveAllClippingPlanes() {
+  if (this->Internal->Planes.empty()) return;
+  this->Internal->Planes.clear();
+  this->Modified();
 }
 
 void vtkVDIProp::SetVisibility(vtkTypeBool visible) {
@@ -359,7 +382,8 @@ bool vtkVDIProp::Draw(vtkRenderer* renderer, vtkOpenGLRenderWindow* window) {
   const pv::Viewport port = pv::viewportOf(renderer);
   if (port.size.x < 1 || port.size.y < 1) return true;
   pv::StillView view{pv::ViewMatrices(renderer), port.size,
-                     static_cast<vdi::Reconstruction>(this->Reconstruction), std::move(internal.Window)};
+                     static_cast<vdi::Reconstruction>(this->Reconstruction), internal.Planes,
+                     std::move(internal.Window)};
   pv::readDepths(window, port, view.window);
   if (internal.DefersIn(window, port.size)) return this->DrawDeferred(window, std::move(view));
   internal.Buffers.still().drop();
@@ -456,6 +480,7 @@ void vtkVDIProp::DrawNow(vtkOpenGLRenderWindow* window, const pv::StillView& vie
   // surface continues.
   if (form.thin || internal.NextFrame == FrameKind::Interactive)
     reconstruction = std::min(reconstruction, vdi::Reconstruction::Smooth);
+  views.setClipPlanes(view.planes);
   const Clock::time_point renderStart = Clock::now();
   const vdi::ImageBytes picture = views.renderBytes(view.matrices.view(size.x, size.y), internal.Ends,
                                                     vdi::Alpha::Premultiplied, reconstruction);

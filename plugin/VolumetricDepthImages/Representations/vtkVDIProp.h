@@ -90,6 +90,11 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   /// shows each list as it is.
   vtkSetClampMacro(Reconstruction, int, 0, 2);
   vtkGetMacro(Reconstruction, int);
+  /// Adds a plane: the prop shows the side to which its normal points. Reports and ignores a plane without a
+  /// normal, and a seventh one.
+  void AddClippingPlane(double originX, double originY, double originZ, double normalX, double normalY,
+                        double normalZ);
+  void RemoveAllClippingPlanes();
   /// The rate of interactive frames, in frames a second, for which the prop chooses its pixels.
   vtkSetClampMacro(FrameRate, double, 1.0, 1000.0);
   vtkGetMacro(FrameRate, double);

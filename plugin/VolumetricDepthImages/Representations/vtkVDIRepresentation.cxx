@@ -116,6 +116,15 @@ void vtkVDIRepresentation::SetReconstruction(int reconstruction) {
   this->Prop->SetReconstruction(reconstruction);
 }
 
+void vtkVDIRepresentation::AddClippingPlane(double originX, double originY, double originZ, double normalX,
+                                            double normalY, double normalZ) {
+  this->Prop->AddClippingPlane(originX, originY, originZ, normalX, normalY, normalZ);
+}
+
+void vtkVDIRepresentation::RemoveAllClippingPlanes() {
+  this->Prop->RemoveAllClippingPlanes();
+}
+
 void vtkVDIRepresentation::SetFrameRate(double rate) {
   this->Prop->SetFrameRate(rate);
 }

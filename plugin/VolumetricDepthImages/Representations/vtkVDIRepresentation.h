@@ -45,6 +45,9 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIRepresentation : publ
 
   /// Properties of vtkVDIProp.
   void SetReconstruction(int reconstruction);
+  void AddClippingPlane(double originX, double originY, double originZ, double normalX, double normalY,
+                        double normalZ);
+  void RemoveAllClippingPlanes();
   void SetFrameRate(double rate);
   void SetOpacity(double opacity);
   /// Whether windows show how far the view is turned from the VDI's viewpoint. Default on. Pictures that are
