@@ -434,15 +434,18 @@ void vtkSMVDIGeneratorProxy::FollowMap() {
   this->Superclass::UpdateVTKObjects();
   this->Shown = this->CurrentSubject();
   double range[2];
-  if (!this->RangeOfScalars(before.Array.c_str(), before.Association, std::nullopt, range)) return;
   vtkSMProxy* map = this->WatchedMap;
-  if (mayRescale(map)) {
+  const bool hasRange = this->RangeOfScalars(before.Array.c_str(), before.Association, std::nullopt, range);
+  if (hasRange && mayRescale(map)) {
     vtkSMProxy* opacity = proxyIn(this, "ScalarOpacityFunction");
     if (opacity == nullptr) opacity = proxyIn(map, "ScalarOpacityFunction");
     vtkSMTransferFunctionProxy::RescaleTransferFunction(map, range[0], range[1]);
     if (opacity != nullptr) vtkSMTransferFunctionProxy::RescaleTransferFunction(opacity, range[0], range[1]);
   }
-  this->AnnounceComponent(map, range);
+  if (hasRange) this->AnnounceComponent(map, range);
+  // The window holds a filter whose map changes, and would make a VDI of the old component with the new map.
+  this->InvokeCommand("Release");
+  this->MarkDirty(this);
 }
 
 void vtkSMVDIGeneratorProxy::AnnounceComponent(vtkSMProxy* map, const double range[2]) {
