@@ -236,8 +236,8 @@ const DIGITS = 7;         // those of single precision
 const MOST_DIGITS = 17;   // those of double precision
 
 /**
- * A camera as text for a URL. Numbers have the digits of single precision, and places more where
- * the coordinates are large compared with the part that the camera sees.
+ * A camera as text for a URL. Numbers have the digits of single precision. Positions have more
+ * digits where the coordinates are large compared with the part that the camera sees.
  * @param {Camera} camera
  */
 export function cameraText(camera) {

@@ -94,7 +94,8 @@ bool mayShow(Ray corners[4]) {
   vec2 low = vec2(0.0);
   vec2 high = vec2(lists);
   vec2 depths = vec2(nearest, farthest);
-  // Otherwise the rays may pass beside V_O's eye, and their places in the picture have no bounds.
+  // Otherwise the rays may pass beside V_O's eye, and their positions in the picture have no
+  // bounds.
   const float finite = 1e30;
   if (stretch.y < finite && (parallel || min(least(depthsIn), least(depthsOut)) > 0.0)) {
     vec4 pixelsIn = 1.0 / (pixelSize * (parallel ? vec4(1.0) : depthsIn));

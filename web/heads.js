@@ -45,8 +45,7 @@ function lowBits(bits) {
 }
 
 /**
- * Masks of tiles. They include the lists around a tile, because smooth reconstruction blends with
- * these.
+ * Masks of tiles. They include the lists around a tile, with which smooth reconstruction blends.
  * @param {Uint32Array} heads
  * @param {number} width
  * @param {number} height
@@ -123,7 +122,7 @@ export function headsOf(vdi) {
     nearest = Math.min(nearest, front(offsets[i]));
     farthest = Math.max(farthest, back(offsets[i + 1] - 1));
   }
-  // In perspective the frusta of V_O's pixels meet in its eye, where depths say nothing.
+  // In perspective the frusta of V_O's pixels meet at its eye, where depths mean nothing.
   if (!vdi.camera.parallel) nearest = Math.max(nearest, farthest * 1e-6);
   const binScale = farthest > nearest ? BINS / (farthest - nearest) : 0;
   const binOf = binning(nearest, farthest, binScale);

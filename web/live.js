@@ -1,4 +1,4 @@
-// A connection to a server. It shows the newest frame that network and machine can keep up with,
+// A connection to a server. It shows the newest frame with which network and machine can keep up,
 // and reconnects after a failure. docs/live.md has the protocol.
 
 import {LevelAssembler, STREAM_VERSION, StreamError, extendedSeries, serverMessageOf} from "./messages.js";
@@ -71,11 +71,11 @@ export class Live {
     this.state = "connecting";
     /** The reason for being lost or refused, in one line. */
     this.cause = "";
-    /** The reason why the connected server gets no frames: a relay may have lost its source. */
+    /** The reason why the connected server gets no frames: perhaps a relay has lost its source. */
     this.trouble = "";
     /** Whether this connection's server has been live. A finished series never is. */
     this.hasBeenLive = false;
-    /** Whether the run has ended. It stays so while the page looks for another one. */
+    /** Whether the run has ended. This stays true while the page looks for another run. */
     this.hasEnded = false;
     this.isPaused = false;
     /** Whether this connection's server has been told of the pause. */

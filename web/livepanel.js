@@ -8,9 +8,9 @@ import {SUBPROTOCOL} from "./messages.js";
 /** @typedef {import("./live.js").Arrived} Arrived */
 
 /**
- * The outcome of a request for a frame. "shown": the page shows it, in full or at the level that came
- * in time; "missed": its file is damaged or gone; "failed": the connection is lost, or the user wants
- * another frame meanwhile.
+ * The outcome of a request for a frame. "shown": the page shows the frame, in full or at the level
+ * that came in time; "missed": its file is damaged or gone; "failed": the connection is lost, or
+ * the user wants another frame by now.
  * @typedef {"shown" | "missed" | "failed"} Outcome
  */
 
@@ -53,7 +53,7 @@ function ageText(seconds) {
 }
 
 /**
- * Whether the run has ended in order and its server is gone. The page looks for another run.
+ * Whether the run has ended as it should and its server is gone. The page looks for another run.
  * @param {Live} live
  */
 function isGone(live) {

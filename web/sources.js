@@ -1,4 +1,4 @@
-// Sources of frames that exist already. The page knows only `Source`, which decodes a frame on
+// Sources of existing frames. The page knows only `Source`, which decodes a frame on
 // request. Frames may be inside the page (`embeddedSource`), or files that the user opened or
 // dropped (`filesSource`). A server sends frames on its own; see live.js.
 

@@ -1,5 +1,5 @@
 // The panel that steers the simulation: control, a new viewpoint, the settings that make the VDIs,
-// and the parameters that the simulation has declared. It is hidden if the server allows no
+// and the parameters that the simulation has declared. The panel is hidden if the server allows no
 // steering.
 
 import {cameraText} from "./camera.js";

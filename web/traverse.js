@@ -1,8 +1,8 @@
 // The fragment shader that shows a VDI from a new viewpoint. Twin of shaders/render.comp,
 // line.glsl, traverse.glsl and intersect.glsl, whose comments give the reasons. A ray is straight
-// in V_O's picture and passes it column by column, or row by row. Here rays don't share work as the
-// invocations of a workgroup do. Each ray finds its own tiles, the large ones first. A first pass
-// finds the regions whose rays meet nothing (cull.js).
+// in V_O's picture and crosses it column by column, or row by row. Here rays don't share work as
+// the invocations of a workgroup do. Each ray finds its own tiles, the large ones first. A first
+// pass finds the regions whose rays meet nothing (cull.js).
 
 import {ON_FACE} from "./slopes.js";
 

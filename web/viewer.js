@@ -253,7 +253,7 @@ export class Viewer {
     this.missing = scale > 1 || (renderer.canShear() && !sheared) ? "detail" : "nothing";
   }
 
-  /** Calls onRest later, once the camera has rested. Further calls until then change nothing. */
+  /** Schedules onRest for when the camera has rested. Further calls until then change nothing. */
   awaitRest() {
     clearTimeout(this.restTimer);
     this.restTimer = setTimeout(() => this.onRest(), Math.max(REST_MS - (performance.now() - this.movedAt), 0));
@@ -270,8 +270,8 @@ export class Viewer {
 
   /**
    * The scale of strips that begin now. A VDI that has no picture yet gets one that is complete
-   * before the next VDI comes. Levels of a frame come in quick succession, and so the longer one of
-   * two stays counts.
+   * before the next VDI comes. Levels of a frame come in quick succession, so the longer of the two
+   * times counts.
    */
   stripScale() {
     if (this.outdatedAt === undefined) return 1;
