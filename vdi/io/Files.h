@@ -12,9 +12,9 @@
 
 namespace vdi::io {
 
-/// A regular file open for reading. Opening a pipe does not wait for its writer. Throws Error{Io} with the
-/// path as context for: no such file; a folder, pipe or device; no permission; a read that fails or ends
-/// early.
+/// A regular file that is open for reading. Opening a pipe does not wait for its writer. Throws
+/// Error{Io} with the path as context for: no such file; a folder, pipe or device; no permission; a
+/// read that fails or ends early.
 class InputFile {
  public:
   explicit InputFile(std::filesystem::path path);

@@ -1,6 +1,6 @@
-// A strict reader for JSON, such as people write. It reports each mistake with its place. Its destructors
-// allocate nothing, in contrast to those of nlohmann's objects and lists: the process would end if that
-// failed.
+// A strict reader for JSON that people write. It reports each mistake with its place. Unlike those
+// of nlohmann's objects and lists, its destructors allocate nothing: if an allocation failed there,
+// the process would end.
 #pragma once
 
 #include <cstddef>

@@ -13,7 +13,8 @@
 
 namespace vdi::io::detail {
 
-/// Whether an LZ4 block of `packedBytes` can expand to `bytes`. A decoder checks this before it allocates.
+/// Whether an LZ4 block of `packedBytes` can expand to `bytes`. A decoder checks this before it
+/// allocates memory.
 bool canExpandTo(std::uint64_t packedBytes, std::uint64_t bytes);
 
 /// The expanded size that an LZ4 block announces, found without expanding it; nullopt if the block is cut

@@ -12,7 +12,8 @@ namespace vdi::io {
 
 /// Takes the bytes of a .vdi file in order, in pieces of any size, from a file or a network. A chunk of lists
 /// is decoded as soon as its bytes are complete, on several threads if a piece completes several chunks.
-/// Memory follows the bytes that have come, not those that are announced. Belongs to one thread at a time.
+/// Allocates memory for bytes that have arrived, not for announced ones. Belongs to one thread at a
+/// time.
 class VdiDecoder {
  public:
   /// `fileBytes` is the size of the file.

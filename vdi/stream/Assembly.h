@@ -26,8 +26,8 @@ struct Received {
   Vdi decode();
 };
 
-/// Assembles the messages of one connection, in order. Memory follows the bytes that have come, not those
-/// that are announced.
+/// Assembles the messages of one connection, in order. Allocates memory for bytes that have
+/// arrived, not for announced ones.
 class Assembly {
  public:
   enum class Gives { Files, Vdis };

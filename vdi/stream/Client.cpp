@@ -311,7 +311,7 @@ class Client::Impl {
     wait_ = std::min(2 * wait_, longestPause);
   }
 
-  /// Makes the client fail for good: trying again would be of no use.
+  /// Makes the client fail for good: another attempt would be of no use.
   void fail(ErrorCode code, const std::string& what) {
     if (std::exchange(hasFailed_, true)) return;
     change([&] { failure_.emplace(code, what); });

@@ -22,16 +22,17 @@ struct ClientOptions {
   std::string command;
   /// PEM file of certificates to trust besides the system's.
   std::filesystem::path authority;
-  /// A level of more bytes ends the connection.
+  /// A level with more bytes than this ends the connection.
   std::uint64_t mostLevelBytes = std::uint64_t{4} << 30;
   /// Received has VDIs, which are decoded while they arrive, instead of files.
   bool decodes = false;
-  /// Gets lines for the user, such as why a connection was lost; from the client's thread.
+  /// Gets lines for the user, such as why a connection was lost, on the client's thread.
   std::function<void(const std::string& line)> log;
 };
 
-/// Connects on a thread of its own, and again whenever a connection is lost, after pauses of up to 5 s. A
-/// level counts as received once next() returns it, so a slow caller gets fewer frames rather than old ones.
+/// Connects on a thread of its own, and reconnects whenever a connection is lost, after pauses of
+/// up to 5 s. A level counts as received once next() returns it, so a slow caller gets fewer frames
+/// rather than old ones.
 class Client {
  public:
   /// Throws Error{Io} for an authority that can't be read. standing() tells later whether the server can be
@@ -42,9 +43,10 @@ class Client {
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
 
-  /// Returns the next whole level, or nullopt after `timeout`. Throws Error, now and in each later call, once
-  /// trying again is of no use: InvalidArgument for a wrong token, Format for a server of another version or
-  /// a peer that isn't a server of VDIs, Io for a certificate that isn't trusted.
+  /// Returns the next whole level, or nullopt after `timeout`. Throws Error, now and in each later
+  /// call, once another attempt is of no use: InvalidArgument for a wrong token, Format for a
+  /// server of another version or a peer that isn't a server of VDIs, Io for a certificate that
+  /// isn't trusted.
   std::optional<Received> next(std::chrono::milliseconds timeout);
 
   struct Standing {

@@ -180,7 +180,7 @@ class SocketConnection : public Connection, public std::enable_shared_from_this<
     viewer_->leave();
   }
 
-  /// Sends what there is to send, one message after the other. Never throws: the hub calls it for one viewer
+  /// Sends the waiting messages, one after the other. Never throws: the hub calls it for one viewer
   /// after the other. Without memory, the connection is cut, and the read under way then ends it.
   void pump() noexcept {
     try {

@@ -42,7 +42,7 @@ class SocketLine : public Line, public std::enable_shared_from_this<SocketLine> 
         socket_(context, tls),
         token_(url.token) {}
 
-  /// start() runs this command and talks over its standard input and output.
+  /// start() runs this command and communicates over its standard input and output.
   void runFirst(const std::string& command) { command_ = command; }
 
   std::string token() const override { return token_; }

@@ -22,8 +22,8 @@ constexpr double silentPeriods = 2.0;
 /// take patienceGrowth times as long, because an even coarser one would lose still more of the picture.
 constexpr double coarsestPatience = 0.2;
 constexpr double patienceGrowth = 2.5;
-/// A level finer than the last frame's first one must take at most this share of those seconds. Otherwise
-/// frames would be sharp and coarse by turns.
+/// A level finer than the last frame's first one must take at most this share of those seconds.
+/// Otherwise frames would alternate between sharp and coarse.
 constexpr double finerShare = 0.8;
 
 double secondsBetween(Clock::time_point from, Clock::time_point to) {

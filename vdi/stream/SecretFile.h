@@ -1,4 +1,4 @@
-// A file with a secret in it.
+// A file that contains a secret.
 #pragma once
 
 #include <sys/types.h>

@@ -202,8 +202,8 @@ class Server::Impl {
     });
   }
 
-  /// Call after an exception, which may have come before the server accepted the next peer. Returns false
-  /// without memory: call it again.
+  /// Call after an exception, which may have come before the server accepted the next peer. Returns
+  /// false if there is no memory: then call it again.
   bool acceptAnew() {
     if (!acceptor_.is_open()) return true;
     try {
@@ -227,8 +227,8 @@ class Server::Impl {
     made->start();
   }
 
-  /// Cuts the oldest connection that hasn't shown the token, so that peers that open many connections and say
-  /// little or nothing keep nobody out. Returns whether there was one.
+  /// Cuts the oldest connection that hasn't shown the token, so that peers that open many
+  /// connections and send little or nothing don't keep others out. Returns whether there was one.
   bool makeRoom() {
     for (auto at = connections_.begin(); at != connections_.end(); ++at) {
       const std::shared_ptr<Connection> oldest = at->second.lock();

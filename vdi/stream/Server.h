@@ -28,8 +28,8 @@ struct ServerOptions {
   std::uint32_t mostConnections = 256;  // of any kind, viewers included
   std::filesystem::path certificate;    // PEM, a chain; empty: no TLS
   std::filesystem::path key;            // PEM
-  /// Called when a viewer wants that frame of the series. Answer with Server::provide or miss. Runs on the
-  /// network's thread, so it must return at once.
+  /// Called when a viewer wants that frame of the series. Answer with Server::provide or
+  /// Server::miss. Runs on the network's thread, so it must return at once.
   std::function<void(std::uint32_t index)> show;
   /// Called with a wish of the viewer that drives; empty: nobody can steer. Wishes have been checked against
   /// the controls that were set last. Runs on the network's thread, so it must return at once.
@@ -53,7 +53,7 @@ class Server {
   /// certificate or key that can't be read; InvalidArgument for a token that requireToken refuses, or a
   /// certificate without a key.
   explicit Server(ServerOptions options);
-  /// Tells viewers that the server ends, and waits for them two seconds at most.
+  /// Tells viewers that the server ends, and waits two seconds at most for them.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

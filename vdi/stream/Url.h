@@ -17,8 +17,8 @@ struct Url {
   std::string authority() const;
 };
 
-/// "http://HOST:PORT/#token=TOKEN", or https. The port defaults to 80 or 443. Throws Error{InvalidArgument},
-/// whose message omits the link's fragment.
+/// "http://HOST:PORT/#token=TOKEN", or https. The port defaults to 80 or 443. Throws
+/// Error{InvalidArgument} with a message that omits the link's fragment.
 Url parseUrl(std::string_view text);
 
 }  // namespace vdi::stream

@@ -40,8 +40,8 @@ class Hub {
   /// A random session. Throws Error{Io} as randomToken.
   explicit Hub(Options options);
 
-  /// Offers the newest frame, or more levels of it, to all viewers that don't look at an older one. Changes
-  /// the phase from Waiting to Live, unless setPhase gave a cause.
+  /// Offers the newest frame, or more levels of it, to all viewers that aren't looking at an older
+  /// one. Changes the phase from Waiting to Live, unless setPhase gave a cause.
   void publish(FramePtr frame, Clock::time_point now);
   /// Offers a frame of the series to the viewers that asked for it.
   void provide(const FramePtr& frame, Clock::time_point now);
