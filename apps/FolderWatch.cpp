@@ -82,7 +82,7 @@ FolderWatch::FolderWatch(std::filesystem::path folder)
   watch();
 }
 
-/// Watches the folder that has the name now. Returns whether it is another one than before.
+/// Watches the folder that has the name now. Returns whether it is a different one than before.
 bool FolderWatch::watch() {
   if (!descriptor_.isOpen()) return false;
   // A file that is opened without a name (O_TMPFILE) is created when it gets one.
@@ -121,7 +121,7 @@ std::chrono::milliseconds FolderWatch::untilListing() const {
   return std::max(std::chrono::ceil<milliseconds>(left), milliseconds(0));
 }
 
-/// Compares a file with what is known of it.
+/// Compares a file with its last known properties.
 void FolderWatch::check(const std::string& name, Changes& changes) {
   const std::filesystem::path file = folder_ / name;
   std::error_code error;
@@ -138,7 +138,7 @@ void FolderWatch::check(const std::string& name, Changes& changes) {
   }
 }
 
-/// Compares the whole folder with what is known of it.
+/// Compares the whole folder with its last known files.
 void FolderWatch::list(Changes& changes) {
   constexpr std::chrono::steady_clock::duration shortest = std::chrono::milliseconds(250);
   constexpr std::chrono::steady_clock::duration longest = std::chrono::minutes(1);

@@ -193,8 +193,8 @@ void FrameFiles::replace(const std::string& name, std::uint32_t index) {
   kept_.remove_if([before](const stream::FramePtr& frame) { return frame->id == before; });
 }
 
-/// Forgets files that are gone, apart from the last ones, which come back if their file system was only out
-/// of order.
+/// Forgets files that are gone, except the last ones, which come back if only their file system had
+/// failed.
 void FrameFiles::noteGone(const std::vector<std::filesystem::path>& gone) {
   constexpr std::size_t mostGone = 256;
   for (const std::filesystem::path& file : gone) {
@@ -271,8 +271,8 @@ bool FrameFiles::send(std::uint32_t index, const std::function<void(stream::Fram
   }
 }
 
-/// The reason why the file isn't the entry's any more; empty if it may be. A file that is gone may still be
-/// kept.
+/// The reason why the file is no longer the entry's; empty if it may be. A file that is gone may
+/// still be kept.
 std::string FrameFiles::changeOf(Entry& entry) const {
   const std::filesystem::path file = pathOf(entry.name);
   const std::optional<FileLook> look = lookAt(file);

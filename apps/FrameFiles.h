@@ -24,7 +24,7 @@ namespace vdi::apps {
 /// Reads, checks and encodes files on a thread of its own, and passes them to a server as the
 /// frames of one series. A frame's id is its index in the series. A file that is replaced becomes a
 /// new frame, and the former one is missing. A file that was only touched stays the frame that it is.
-/// The memory taken grows with the number of files that exist, and by a bit for each frame.
+/// The memory grows with the number of files that exist, and by a bit for each frame.
 class FrameFiles {
  public:
   struct Options {

@@ -95,8 +95,8 @@ class SeriesWalk {
   bool isDone(const stream::Client::Standing& standing) const {
     return next_ && hasEnded(standing) && *next_ >= *standing.series;
   }
-  /// Requests the first frame once the server has a finished series. A server that was live has none when it
-  /// ends: it says "ended" before it closes the connection.
+  /// Requests the first frame once the server has a finished series. A server that was live has no
+  /// series when it ends: it says "ended" before it closes the connection.
   void begin(stream::Client& client, const stream::Client::Standing& standing) {
     if (next_ || !standing.isConnected || !hasEnded(standing) || standing.hasBeenLive) return;
     next_ = 0;
@@ -124,11 +124,11 @@ void requirePatience(const stream::Client::Standing& standing, double patience, 
                                          standing.trouble.empty() ? "no answer" : standing.trouble));
 }
 
-/// Ends a walk whose server is a relay that can't get at the series' own server.
+/// Ends a walk whose server is a relay that can't reach the series' own server.
 class SourcePatience {
  public:
   explicit SourcePatience(double seconds) : seconds_(seconds) {}
-  /// Throws Error{Io} if the server has said for so long why it has no frames.
+  /// Throws Error{Io} if the server has reported for that long why it has no frames.
   void require(const stream::Client::Standing& standing, std::uint64_t count) {
     const auto now = std::chrono::steady_clock::now();
     if (!standing.isConnected || standing.state.cause.empty()) since_ = now;

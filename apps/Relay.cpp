@@ -52,7 +52,7 @@ void Relay::follow(const stream::Client::Standing& standing) {
   tell(standing);
 }
 
-/// Tells viewers of the other server's state, or that it doesn't answer. A run that has ended needs no
+/// Tells viewers the other server's state, or that it doesn't answer. A run that has ended needs no
 /// answer.
 void Relay::tell(const stream::Client::Standing& standing) {
   stream::State state{phase_.value_or(stream::Phase::Waiting), 0, {}};
@@ -113,7 +113,8 @@ void Relay::ask() {
   }
 }
 
-/// Answers for the frame that the other server was asked for. Viewers would wait for it for ever.
+/// Tells viewers that the frame requested from the other server is gone. Otherwise they would wait
+/// for ever.
 void Relay::giveUp() {
   if (asked_) server_->miss({*asked_, gone});
   asked_.reset();

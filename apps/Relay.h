@@ -18,8 +18,9 @@ namespace vdi::apps {
 
 /// A client of the other server, and a server for its own viewers. It passes on frames unchanged. If a viewer
 /// asks for a frame of the series, the relay fetches it, and newer frames wait meanwhile. If the
-/// other server restarts, viewers see a restart, too. While it doesn't answer, they are told so. Once
-/// it has ended a run, viewers get the frames that the relay still has, and hear that others are gone.
+/// other server restarts, viewers see a restart, too. While it doesn't answer, they are told so.
+/// Once it has ended a run, viewers get the frames that the relay still has, and are told that
+/// others are gone.
 class Relay {
  public:
   /// Throws Error as Client and Server do.

@@ -80,7 +80,7 @@ void say(const std::string& message) {
   fmt::print(stderr, "vdi: {}\n", message);
 }
 
-/// Parses the command line and does what it asks for.
+/// Parses the command line and runs the selected subcommand.
 Outcome runCommand(int argc, char** argv) {
   const vdi::comm::Communicator world = vdi::comm::Communicator::world();
   CLI::App app(

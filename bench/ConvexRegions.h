@@ -1,5 +1,5 @@
-// Boxes separated by planes, and their order for a camera. Compositing of whole pictures needs that
-// order. VDIs don't.
+// Boxes separated by planes, and their order for a camera. Compositing whole pictures requires that
+// order; compositing VDIs doesn't.
 #pragma once
 
 #include <cstddef>

@@ -224,7 +224,7 @@ void addFigures(json& row, const FrameFigures& figures) {
   for (std::size_t i = 0; i < frameStages; ++i) {
     const StageTimes& stage = figures.stages[i];
     const bool ran = several || i == static_cast<std::size_t>(FrameStage::Generate);
-    // generate_ms is the device's time, for compatibility. The row has it already.
+    // generate_ms is the device's time, for compatibility with older files. The row has it already.
     if (i != static_cast<std::size_t>(FrameStage::Generate))
       row[std::string(sources[i].name) + "_ms"] = ran ? json(stage.wall.slowest) : json(nullptr);
     if (!ran) continue;

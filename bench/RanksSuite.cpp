@@ -87,8 +87,8 @@ std::string tableHead() {
       "gather", "frame", "faster", "VDIs/s", "more", "DVR", "sent", "M subs");
 }
 
-/// One rank's figures for a volume, layout and settings. Rows of other rank counts have ratios to
-/// them.
+/// The figures of one rank for a volume, layout and settings. Rows of other rank counts have ratios
+/// to these.
 struct OneRank {
   double frameMs = 0.0;
   std::optional<double> vdisPerSecond;

@@ -1,4 +1,4 @@
-// Moves values so that each rank owns one box. Compositing of whole pictures requires that.
+// Moves values so that each rank owns one box, as compositing whole pictures requires.
 #pragma once
 
 #include <cstdint>
