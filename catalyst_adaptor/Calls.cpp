@@ -59,8 +59,8 @@ void checkBlock(const vdi_catalyst_block& block) {
   requireCountable(block);
 }
 
-/// Collective: the speaker's text on all ranks. A rank without memory for all of it gets its beginning, and
-/// leaves no other waiting.
+/// Collective: the speaker's text on all ranks. A rank without memory for all of it gets its
+/// beginning, and doesn't leave other ranks waiting.
 std::string shared(MPI_Comm comm, std::string_view text, int speaker) {
   auto length = static_cast<std::uint64_t>(text.size());
   MPI_Bcast(&length, 1, MPI_UINT64_T, speaker, comm);

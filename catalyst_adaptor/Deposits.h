@@ -29,7 +29,7 @@ class Deposits {
   /// Collective: makes the array of the particles of that name, which `fields` has, and keeps it there.
   /// Throws on all ranks, as ParticleDepositor does. The report of particles that are left out names `step`.
   void make(Fields& fields, const std::string& name, std::int64_t step);
-  /// Takes over the record of the faults that another object has reported.
+  /// Takes over another object's record of reported faults.
   void continueTelling(const Deposits& other) { told_ = other.told_; }
 
  private:

@@ -23,9 +23,9 @@ struct GivenArray {
   std::int32_t components;
 };
 
-/// These functions implement those of vdi_catalyst.h. Collective. After an error, blocks and arrays are as
-/// before.
-/// Once the blocks are checked, setBlocks also runs `prepare`, which may throw, but must not communicate.
+/// These functions implement those of vdi_catalyst.h. Collective. After an error, blocks and arrays
+/// are unchanged. Once the blocks are checked, setBlocks also runs `prepare`, which may throw, but
+/// must not communicate.
 int setBlocks(
     FieldCalls& self, std::int32_t count, const vdi_catalyst_block* blocks,
     FunctionRef<void()> prepare = [] {});

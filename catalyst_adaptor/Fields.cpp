@@ -236,7 +236,7 @@ Fields::Values Fields::valuesOf(const std::string& name, bool cells, int compone
 }
 
 std::vector<Block> Fields::placesOf(const std::string& name, bool cells) const {
-  // Particles become an array of all blocks, which counts even before it is made.
+  // Particles become an array that all blocks have, and it counts even before it is made.
   const Array* array = find(name, cells);
   std::vector<Block> places;
   if (array == nullptr && !has(name, cells)) return places;

@@ -1,5 +1,5 @@
-/* libvdi_catalyst.so, which a simulation links. It is small, and loads an engine when it is initialised. So a
- * simulation that doesn't use ParaView doesn't pay for it. */
+/* libvdi_catalyst.so, which a simulation links. It is small, and loads an engine only when it is
+ * initialised. A simulation that doesn't use ParaView therefore doesn't pay for it. */
 #include <dlfcn.h>
 #include <fenv.h>
 #include <mpi.h>
@@ -142,7 +142,7 @@ static int initialize_with(const vdi_engine* engine, int32_t communicator, const
   }
 }
 
-/* Asks the isolated engine first if it may have to carry out the run. */
+/* If the isolated engine may have to carry out the run, asks it first. */
 static int initialize_some(int32_t communicator, const vdi_given* given, vdi_engine** run,
                            vdi_catalyst** catalyst) {
   const MPI_Comm comm = communicator_of(communicator);

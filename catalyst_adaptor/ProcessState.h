@@ -24,9 +24,10 @@ typedef struct vdi_process_state {
   struct rlimit limits[RLIM_NLIMITS];
 } vdi_process_state;
 
-/* Saves the process's state and sets the state for our calls. The floating-point environment becomes the
- * default, because libraries do things that simulations trap. SIGPIPE and SIGXFSZ are ignored where they
- * would end the process. The environment gets the variables that scripts have set in earlier calls. */
+/* Saves the process's state and sets the state for our calls. The floating-point environment
+ * becomes the default, because libraries perform operations that simulations trap. SIGPIPE and
+ * SIGXFSZ are ignored where they would end the process. The environment gets the variables that
+ * scripts have set in earlier calls. */
 void vdi_process_state_save(vdi_process_state* state);
 
 /* Restores what differs from `state`, and frees the memory that it holds. Keeps changed environment variables

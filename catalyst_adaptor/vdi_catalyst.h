@@ -30,18 +30,19 @@
  * enter, or enters a different one, the update fails on all ranks, and so does the step. Only in ParaView's
  * own collective filters and views do the others wait, as in any MPI program.
  *
- * The process stays the simulation's. When a call returns, these are as before it: the handlers of signals,
- * the calling thread's signal mask and floating-point environment (traps, rounding, flags), the locale, the
- * environment variables, the working directory, the umask and the soft limits of resources. At the next step,
- * scripts find the variables again that they have set. During a call, a signal finds the simulation's
- * handler, unless a script sets another one. SIGPIPE and SIGXFSZ, which a file beyond the size limit raises,
+ * The process stays the simulation's. When a call returns, the following are as they were before
+ * it: the handlers of signals, the calling thread's signal mask and floating-point environment
+ * (traps, rounding, flags), the locale, the environment variables, the working directory, the umask
+ * and the soft limits of resources. At the next step, scripts find the variables again that they
+ * have set. During a call, a signal finds the simulation's handler, unless a script sets another
+ * one. SIGPIPE and SIGXFSZ, which a file beyond the size limit raises,
  * are ignored if they would end the process.
  *
- * These events still end the process, because ParaView, Python or a library gives no choice: a script that
- * calls os._exit or os.abort, or crashes in one of its modules; an allocation of ParaView's own that fails
- * (Debian's VTK aborts); an X server that goes away while a view is drawn (Xlib exits); a view that is drawn
- * without a display by methods of its render window or SMProxy instead of paraview.simple; a crash of a
- * driver.
+ * The following events still end the process, because ParaView, Python or a library leaves no
+ * choice: a script that calls os._exit or os.abort, or crashes in one of its modules; an allocation
+ * of ParaView's own that fails (Debian's VTK aborts); an X server that goes away while a view is
+ * drawn (Xlib exits); a view that is drawn without a display by methods of its render window or
+ * SMProxy instead of paraview.simple; a crash of a driver.
  *
  * None of these events ends the process if frames are made in processes of their own: by "isolation" in a
  * JSON text, or by VDI_ISOLATION=process in the first rank's environment. Then vdi_catalyst_execute copies
@@ -99,10 +100,10 @@ enum { VDI_CATALYST_POINTS = 0, VDI_CATALYST_CELLS = 1 };
  * Neighbours are blocks of any rank and any spacing. They may share the points of their common face, or end
  * one cell apart (points), or meet at a face (cells). Ranks exchange the values that a block needs of its
  * neighbours, whether it has ghost layers or not. A neighbour's values replace ghost values wherever it has
- * cells of its own. Ghost layers thus count beyond the domain only, as those of periodic or mirrored sides.
- * There, values straight beside a block are read. Those at edges and corners (beyond the block along two or
- * three axes) may be unset: they are never shown, but continued from the layers' faces. Finite ones count in
- * an automatic range of colours all the same.
+ * cells of its own. Ghost layers therefore count beyond the domain only, as on periodic or mirrored
+ * sides. There, values straight beside a block are read. Those at edges and corners (beyond the
+ * block along two or three axes) may be unset: they are never shown, and the values there are
+ * continued from the layers' faces. Finite ones still count in an automatic range of colours.
  *
  * Blocks of different spacing may overlap: the finest is shown. Blocks of equal spacing must not overlap,
  * except by ghost layers announced as such. An overlap by more than a thousandth of a cell is an error that
@@ -131,7 +132,7 @@ typedef struct vdi_catalyst vdi_catalyst;
 VDI_CATALYST_API int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count,
                                              const char* const* scripts, vdi_catalyst** catalyst);
 
-/* A script with arguments: what paraview.catalyst.get_args() returns in it. */
+/* A script with arguments, which paraview.catalyst.get_args() returns in it. */
 typedef struct vdi_catalyst_pipeline {
   const char* file;
   int32_t argument_count;
@@ -169,9 +170,9 @@ VDI_CATALYST_API int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* 
                                             int32_t association, const void* const* data);
 
 /* The layout of the values of one block, in bytes: component c of value (x, y, z) lies at the block's pointer
- * + x * strides[0] + y * strides[1] + z * strides[2] + c * component_stride. So the pointer is to the block's
- * first value, wherever in an allocation that lies: layers before it, and padding, are never read. Strides
- * may be 0 or negative, and need not be multiples of the scalar's size. */
+ * + x * strides[0] + y * strides[1] + z * strides[2] + c * component_stride. So the pointer refers
+ * to the block's first value, wherever in an allocation that lies. Layers before it, and padding,
+ * are never read. Strides may be 0 or negative, and need not be multiples of the scalar's size. */
 typedef struct vdi_catalyst_strides {
   int64_t strides[3];
   int64_t component_stride; /* unused for one component */
@@ -184,9 +185,9 @@ typedef struct vdi_catalyst_strides {
  * components = 1.
  *
  * Values are read where they are, in any layout: a run without scripts never copies them on the host, nor
- * does VolumetricDepthImage in a script. A filter of
- * ParaView's that asks for a pointer to values in another layout than that of vdi_catalyst_set_array gets a
- * copy, made then. */
+ * does VolumetricDepthImage in a script. If a filter of ParaView's own asks for a pointer to values
+ * in a layout other than that of vdi_catalyst_set_array, it gets a copy, which is made at that
+ * moment. */
 VDI_CATALYST_API int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int32_t type,
                                                     int32_t association, int32_t components,
                                                     const void* const* data,
@@ -195,10 +196,10 @@ VDI_CATALYST_API int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, cons
 /* Shifts the values of an array from the points or the centres of cells by offset[axis] cells along each
  * axis, from -0.5 to 0.5, as on staggered grids. The offset is the same on all ranks. For example, values of
  * cells with the offset {-0.5, 0, 0} lie on the lower x faces of their cells. Blocks stay where they are;
- * beyond a block's values, its neighbours' values count; at the domain's end, the last values continue. An
- * offset goes with the association and the name, may come before its array, and is forgotten by
- * vdi_catalyst_set_blocks. In scripts, VolumetricDepthImage follows it, and ParaView's own filters don't know
- * it. */
+ * beyond a block's values, its neighbours' values count; at the domain's end, the last values
+ * continue. An offset belongs to an association and a name, and may come before its array;
+ * vdi_catalyst_set_blocks forgets it. In scripts, VolumetricDepthImage follows it, but ParaView's
+ * own filters don't know it. */
 VDI_CATALYST_API int vdi_catalyst_set_array_offset(vdi_catalyst* catalyst, const char* name,
                                                    int32_t association, const double offset[3]);
 
@@ -244,9 +245,10 @@ typedef struct vdi_catalyst_particles {
  *   applies: at that length both spread equally wide, and a shorter kernel could miss all centres.
  *
  * No weight is lost: the shares of each particle are divided by their sum over all cells that blocks own.
- * Near a face of the domain, the weight that would lie beyond it thus goes to the cells on this side. Ghost
- * cells get the values of their owners, and cells that finer blocks hide the mean of what hides them. The
- * result is the same for any distribution of blocks and particles over ranks, to within rounding to f32.
+ * Near a face of the domain, the weight that would lie beyond it thus goes to the cells on this
+ * side. Ghost cells get the values of their owners. Cells that finer blocks hide get the mean of
+ * the cells that hide them. The result is the same for any distribution of blocks and particles
+ * over ranks, to within rounding to f32.
  *
  * Particles outside all blocks (blocks own their lower faces, not their upper ones), and those whose position
  * or weight isn't finite, are left out. Those whose h is NaN, infinite, 0 or negative are deposited by cloud
@@ -261,12 +263,13 @@ VDI_CATALYST_API int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const ch
 
 /* Returns whether a script will do anything at this step: 1 if it will or if that is unknown, 0 if not; the
  * same on all ranks. After 0, the simulation need neither prepare its values nor call vdi_catalyst_execute.
- * The result is 1 if a script isn't loaded yet, as before the first step; if a script defines
- * catalyst_execute, which runs at each step; and if the trigger of an extractor is due. In a run without a
- * script it is 1 if a frame is due by step, time or clock, whether or not the data and the share of wall time
- * will permit it, and at each step if viewers may steer. Where scripts run in a process of their own, it is
- * 1, too, while that process is at work and hasn't answered yet. It is 0 for a null or finalized handle and
- * for a step that vdi_catalyst_execute refuses. */
+ * The result is 1 in three cases: if a script isn't loaded yet, as before the first step; if a
+ * script defines catalyst_execute, which runs at each step; or if the trigger of an extractor is
+ * due. In a run without a script it is 1 if a frame is due by step, time or clock, whether or not
+ * the data and the share of wall time will permit it, and at each step if viewers may steer. Where
+ * scripts run in a process of their own, it is 1, too, while that process is at work and hasn't
+ * answered yet. It is 0 for a null or finalized handle and for a step that vdi_catalyst_execute
+ * refuses. */
 VDI_CATALYST_API int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time);
 
 /* Runs the scripts on the blocks as they are now. `step` is the same on all ranks, from 0 to INT32_MAX,

@@ -172,7 +172,7 @@ int Session::execute(const Node& params) {
   // vdi_catalyst_execute reports a number that no step can have.
   bool isWanted = true;
   if (code == VDI_CATALYST_OK && isStep(step)) isWanted = vdi_catalyst_wants(catalyst_, step, time) != 0;
-  // A lost engine wants no step. Only vdi_catalyst_execute tells whether it is still lost.
+  // A lost engine wants no step. Only vdi_catalyst_execute can tell whether it is still lost.
   if (!isWanted && !hasLostEngine_) return code;
   if (code == VDI_CATALYST_OK) code = handOver(step, params);
   if (code == VDI_CATALYST_OK) {

@@ -42,8 +42,8 @@ void FrameProcess::orGiveUp(Work work) noexcept {
   }
 }
 
-/// Sends what `fill` puts into a message. If that fails, takes the messages with the cause, and counts the
-/// process as gone.
+/// Sends a message that `fill` fills in. If that fails, takes the messages with the cause, and
+/// counts the process as gone.
 template <typename Fill>
 void FrameProcess::tell(Fill fill, std::span<const int> descriptors) noexcept {
   bool isSent = false;
@@ -147,7 +147,7 @@ std::string FrameProcess::end() const {
   } else if (status_) {
     cause = "ended with exit status " + std::to_string(WEXITSTATUS(*status_));
   } else if (isHungUp_ && worker_ > 0) {
-    // A supervisor that can still do so tells how its worker ended.
+    // If the supervisor still can, it tells how its worker ended.
     cause = "was killed together with the one that supervises it, as by SIGKILL to both,";
   }
   return cause + " " + stage();

@@ -368,8 +368,8 @@ int IsolatedRun::handOver(std::int64_t step, double time, double now) {
   return earlier;
 }
 
-/// Collective: whether a rank's answer is yes. One rank's stopped process keeps the others' from their
-/// frames, so only the stopped one is reported as the cause.
+/// Collective: whether a rank's answer is yes. One rank's stopped process keeps those of the other
+/// ranks from finishing frames, so only the stopped one is reported as the cause.
 bool IsolatedRun::isOfAny(bool answer) const {
   return meet<1>(self_.comm, {answer ? 1 : 0})[0] != 0;
 }

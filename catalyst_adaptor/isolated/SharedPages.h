@@ -9,8 +9,8 @@
 
 namespace vdi::catalyst {
 
-/// Memory without a name, which is gone when both processes are. It doesn't lie in /dev/shm, so neither that
-/// folder's size nor a full one matters.
+/// Memory without a name, which is gone when both processes are. It doesn't lie in /dev/shm, so a
+/// small or full /dev/shm doesn't matter.
 class SharedPages {
  public:
   SharedPages() = default;

@@ -23,7 +23,7 @@ class Socket {
   Socket() = default;
   explicit Socket(Descriptor descriptor) : descriptor_(std::move(descriptor)) {}
 
-  /// Listens under a name that isn't one of the file system. Throws std::runtime_error.
+  /// Listens under a name outside the file system. Throws std::runtime_error.
   static Socket listener(const std::string& name);
   /// Connects to a listener of the same user; a closed socket if there is none.
   static Socket connectTo(const std::string& name);

@@ -1,4 +1,4 @@
-// Signals that a batch system or a terminal sends to a simulation with all that belongs to it, so that it
+// Signals that a batch system or a terminal sends to all processes of a simulation, so that it
 // writes a checkpoint or ends.
 #pragma once
 
@@ -7,8 +7,9 @@
 
 namespace vdi::catalyst {
 
-/// An isolated run's processes end with the simulation, which alone decides what these signals mean. So they
-/// do nothing there. SIGSTOP and SIGKILL always act; SIGCONT, which ends the former, does no harm.
+/// An isolated run's processes end with the simulation, which alone decides what these signals
+/// mean. In those processes they therefore do nothing. SIGSTOP and SIGKILL always act; SIGCONT,
+/// which ends the former, does no harm.
 constexpr std::array stepSignals{SIGHUP,  SIGINT,  SIGQUIT, SIGUSR1, SIGUSR2,
                                  SIGALRM, SIGTERM, SIGXCPU, SIGTSTP};
 

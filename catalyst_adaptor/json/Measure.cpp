@@ -75,7 +75,7 @@ void withLoad(int type, Visit visit) {
 
 }  // namespace
 
-/// Goes through the values of a part.
+/// Visits the values of a part.
 class Sweep {
  public:
   Sweep(const Measure::OwnedPart& part, const StridedValues& values, int component)

@@ -15,9 +15,9 @@
 namespace vdi::catalyst {
 
 /// Reads values of any type and order where they are, and copies none. Each place counts once: ghost layers
-/// and values that finer blocks cover are left out. A mean weights each value by the volume that it stands
-/// for within its block's owned part. So a point on a face between two blocks counts half in each. Values of
-/// staggered grids count like those of their cells or points.
+/// and values that finer blocks cover are left out. A mean weights each value by the volume that it
+/// represents within its block's owned part. A point on a face between two blocks therefore counts
+/// half in each. Values of staggered grids count like those of their cells or points.
 class Measure {
  public:
   explicit Measure(config::RunCondition condition) : condition_(std::move(condition)) {}

@@ -109,7 +109,7 @@ struct RunEngine::State {
     if (run.when) measure.emplace(*run.when);
   }
 
-  /// Collective: makes the device and what needs one. After a failure, no rank has them.
+  /// Collective: makes the device and the objects that need one. After a failure, no rank has them.
   void start() {
     generator.reset();
     std::unique_ptr<Deposits> fresh;
@@ -246,8 +246,8 @@ bool RunEngine::hasWallTime(std::int64_t step, double time) {
   return false;
 }
 
-/// Leaves the step out if its frame could exceed the bound of a process's memory on any rank. Then the memory
-/// of earlier frames is freed for the simulation. Collective.
+/// Leaves the step out if its frame could exceed the bound of a process's memory on any rank. In
+/// that case, frees the memory of earlier frames for the simulation. Collective.
 bool RunEngine::hasHostMemory(std::int64_t step, double time) {
   State& state = *state_;
   if (!state.hostMemory.isSet()) return true;

@@ -1,4 +1,4 @@
-// An agreement among ranks, so that none waits for a rank whose script has ended.
+// Agreement among ranks, so that none waits for a rank whose script has ended.
 #pragma once
 
 #include <mpi.h>
@@ -9,9 +9,10 @@
 namespace vdi::catalyst {
 
 /// Ranks that run scripts meet here, on a communicator of their own: before each of our collective operations
-/// (plugin/.../VDICollective.h), and when a part of a script has ended. A rank whose script has failed keeps
-/// meeting until the part has ended on all ranks. So ranks that want to enter an operation are refused
-/// instead of waiting there. All functions are collective in this sense: any of them meets any other.
+/// (plugin/.../VDICollective.h), and when a part of a script has ended. A rank whose script has
+/// failed keeps meeting the others until the part has ended on all ranks. Ranks that want to enter
+/// an operation are therefore refused instead of waiting there. All functions are collective in
+/// this sense: any of them meets any other.
 class Agreement {
  public:
   /// Duplicates the communicator.

@@ -62,7 +62,7 @@ class Log {
   Log(const Log&) = delete;
   Log& operator=(const Log&) = delete;
 
-  /// Undoes the choice of output that ParaView makes at its start.
+  /// Silences VTK's log on standard error again: ParaView sets its verbosity when it starts.
   static void silenceOtherOutput() { vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF); }
 
   /// The first error since the last call; "" if there was none.
@@ -160,7 +160,7 @@ class Guard {
     throw std::runtime_error("ParaView's Python modules can't be imported; is python3-paraview installed?");
   }
 
-  /// Returns the fault of a script that is visible before it runs; "" if there is none.
+  /// Returns a fault of a script that is visible before the script runs; "" if there is none.
   std::string check(const std::string& script) {
     const vtkPythonScopeGilEnsurer lock;
     const vtkSmartPyObject result(PyObject_CallMethod(module_, "check_script", "s", script.c_str()));

@@ -21,10 +21,10 @@
 
 namespace vdi::catalyst {
 
-/// VolumetricDepthImage reads the values where they are. So do those of ParaView's filters that ask for
-/// values one by one. A filter that asks for a pointer gets one to a copy, which is made at its first request
-/// after each Modified(), or to the values themselves if they are in order. The array can't be written: VTK's
-/// filters get ordinary arrays from NewInstance.
+/// VolumetricDepthImage reads the values where they are. So do ParaView's filters that ask for
+/// values one by one. A filter that asks for a pointer gets one to a copy, which is made at its
+/// first request after each Modified(), or to the values themselves if they are in order. The array
+/// can't be written: VTK's filters get ordinary arrays from NewInstance.
 template <typename T>
 class StridedDataArray : public vtkGenericDataArray<StridedDataArray<T>, T>, public pv::StridedSource {
   using Self = StridedDataArray<T>;

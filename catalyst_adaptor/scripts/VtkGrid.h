@@ -20,9 +20,9 @@ class VtkGrid {
   /// there is no memory for the marks.
   explicit VtkGrid(std::span<const vdi_catalyst_block> blocks);
 
-  /// Gives the images the arrays of `fields`, which has the same blocks, and tells VTK that all values may
-  /// have changed. The arrays use the simulation's memory. After an exception the images lack some arrays
-  /// until the next call.
+  /// Gives the images the arrays of `fields`, which has the same blocks, and marks all values as
+  /// changed for VTK. The arrays use the simulation's memory. After an exception the images lack
+  /// some arrays until the next call.
   void update(const Fields& fields);
 
   vtkPartitionedDataSet& data() { return *data_; }

@@ -27,8 +27,8 @@ program phases
   call find_place()
   first = n * place / parts
   cells = n * (place + 1) / parts - first
-  ! The array has two layers of halo all around, and a padded first dimension, as codes have it
-  ! for aligned columns.
+  ! The array has two layers of halo all around. Its first dimension is padded, as in codes that
+  ! align columns.
   allocate(phi(1 - halo:cells(1) + halo + padding, 1 - halo:cells(2) + halo, &
                1 - halo:cells(3) + halo))
   allocate(rate(cells(1), cells(2), cells(3)))

@@ -24,8 +24,8 @@ struct Options {
 };
 
 /// The blocks of this rank as the adaptor takes them: cell data with one layer of ghost cells all around. At
-/// the faces of the domain, periodic neighbours aren't neighbours in space. The halo exists there, too, so
-/// the ghost layer is announced and merely lies outside.
+/// the faces of the domain, periodic neighbours aren't neighbours in space. The halo exists there,
+/// too, so the program announces the ghost layer, which merely lies outside.
 std::vector<vdi_catalyst_block> describe(const gray_scott::Simulation& simulation, int size) {
   std::vector<vdi_catalyst_block> blocks;
   const int n = simulation.cellsPerBlock();

@@ -1,5 +1,5 @@
-// Gray-Scott reaction-diffusion in three dimensions (Pearson, Science 261, 1993), on blocks dealt to MPI
-// ranks.
+// Gray-Scott reaction-diffusion in three dimensions (Pearson, Science 261, 1993), on blocks
+// assigned to MPI ranks.
 #pragma once
 
 #include <mpi.h>
@@ -30,8 +30,9 @@ struct Block {
   std::vector<float> nextV;
 };
 
-/// The simulation numbers blocks along a Morton curve, and deals them to the ranks one after the other. So
-/// each rank's region is scattered all over the domain, far from convex, as after load balancing.
+/// The simulation numbers blocks along a Morton curve, and assigns them to the ranks in turn. Each
+/// rank's region is therefore scattered all over the domain, far from convex, as after load
+/// balancing.
 class Simulation {
  public:
   Simulation(MPI_Comm comm, const Parameters& parameters);

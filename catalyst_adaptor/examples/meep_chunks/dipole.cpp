@@ -52,7 +52,8 @@ int handOver(vdi_catalyst* vdi, const meep::fields& fields) {
     strides.push_back(layout);
   }
   const int type = sizeof(meep::realnum) == sizeof(double) ? VDI_CATALYST_F64 : VDI_CATALYST_F32;
-  // Chunks own the upper ones of two values, so these lie on upper faces, or in the middle along z.
+  // A chunk owns the upper one of two values, so its values lie on upper faces, or in the middle
+  // along z.
   double offset[] = {0.0, 0.0, 0.0};
   for (int a = 0; a < 3; ++a) offset[a] = 0.5 * (1 - fields.gv.iyee_shift(shown).in_direction(axes[a]));
   int code = vdi_catalyst_set_blocks(vdi, static_cast<int>(blocks.size()), blocks.data());

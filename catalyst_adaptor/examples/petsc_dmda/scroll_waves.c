@@ -5,8 +5,8 @@
  *     mpirun -n 4 scroll_waves [vdi.json] [PETSc's options, such as -da_grid_x 64]
  *
  * The program writes the last u and v to scroll_waves.bin. Without vdi.json it draws nothing, and the
- * result has the same bits. A code that solves by TS calls vdi_catalyst_execute in the function that
- * it gives TSMonitorSet. */
+ * result has the same bits. A code that solves by TS calls vdi_catalyst_execute in the function
+ * that it passes to TSMonitorSet. */
 #include <math.h>
 #include <petscdmda.h>
 

@@ -81,8 +81,8 @@ extern "C" void disregard(int number) {
   raise(number);
 }
 
-/// Disregards the signals by a handler, because programs that a script starts would inherit that they are
-/// ignored or blocked.
+/// Disregards the signals through a handler: programs that a script starts would inherit signals
+/// that are ignored or blocked.
 void disregardStepSignals() {
   struct sigaction action {};
   action.sa_handler = disregard;
@@ -211,7 +211,8 @@ class Worker {
     if (!setup_.isJson) tellWanted(notice.step + 1);
   }
 
-  /// The step that lies in the notice's buffer. Throws if this process can't get at it, or if it is damaged.
+  /// The step in the notice's buffer. Throws if this process can't map the buffer, or if the step
+  /// is damaged.
   StepData dataOf(const StepNotice& notice, Socket::Received& received) {
     SharedPages& buffer = buffers_.at(notice.buffer);
     if (notice.isNewBuffer) {
