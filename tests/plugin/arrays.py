@@ -1,4 +1,5 @@
-"""Another array, component or input brings its own colours, at once, whatever updates the filter next."""
+"""Another array, component or input brings its own colours at once, whatever updates the filter
+next."""
 
 import gc
 import os

@@ -1,5 +1,6 @@
-"""Filters of one input share its volume: another camera costs no upload and next to no memory, its VDI is that of a filter
-alone, and none of them changes another's VDI. On any number of ranks. The times are this machine's."""
+"""Filters of one input share its volume. Another camera costs no upload and next to no memory, and
+its VDI is that of a filter on its own. No filter changes another's VDI. On any number of ranks. The
+times are this machine's."""
 
 import time
 
@@ -175,14 +176,14 @@ command(third, "Prepare")
 release(first)
 check(same(lists(first), expected[0]), "a VDI that is made in place meanwhile is right, too")
 third.Supersegments = 8
-command(third, "Hold")  # gives up what it has begun, or waits to begin
+command(third, "Hold")  # cancels what it has begun, or waits to begin
 check(wait_for([second]) == [100], "a preparation that is given up holds up no other")
 release(third)
 check(same(lists(third), fewer[2]), "a filter that gave up a preparation makes the next VDI")
 release(second)
 check(same(lists(second), expected[1]), "the second filter takes its prepared VDI")
 
-# Filters that go.
+# Filters that are deleted.
 second.Supersegments, third.Supersegments = 8, 25
 for image in (second, third):
     command(image, "Hold")

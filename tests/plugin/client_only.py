@@ -37,7 +37,7 @@ with open(LOG, "w") as log, open(os.path.join(OUTPUT, "server.log"), "w+") as se
             env=server.clean_environment(PV_PLUGIN_CONFIG_FILE=os.environ["VDI_PLUGIN_LIST"],
                                          HOME=os.path.join(OUTPUT, "home")))
         wait_for("line about the server", lambda: lines() or client.poll() is not None)
-        time.sleep(3)  # ParaView shows its plugin manager, and tells again of what is loaded
+        time.sleep(3)  # ParaView shows its plugin manager, and lists the loaded plugins again
     finally:
         for process in (client, pvserver):
             if process is not None:

@@ -48,7 +48,7 @@ class Scene:
         self.colors.RGBPoints = [number for node in nodes for number in [self.at(node[0])] + list(node[1:])]
 
     def reset(self):
-        """A map between the ends of the range, and opacities that let one see all of it."""
+        """A map between the ends of the range, and opacities that show all of it."""
         for name, value in {"ColorSpace": "RGB", "Discretize": 1, "NumberOfTableValues": 256, "UseLogScale": 0,
                             "InterpretValuesAsCategories": 0, "UseAboveRangeColor": 0, "UseBelowRangeColor": 0,
                             "HSVWrap": 0, "Annotations": [], "IndexedColors": [], "ScalarRangeInitialized": 1}.items():
@@ -110,7 +110,7 @@ def check_picture(name, scene, with_volume):
 
 
 def rainbow(count):
-    """Control points whose hues recur, none of them grey."""
+    """Control points with recurring hues, none of them grey."""
     places = np.linspace(0, 1, count)
     return [(x, 0.5 + 0.5 * np.sin(9 * x), 0.5 + 0.5 * np.sin(9 * x + 2), 0.5 + 0.5 * np.sin(9 * x + 4)) for x in places]
 

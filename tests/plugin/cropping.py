@@ -15,7 +15,8 @@ def waves_source():
 
 
 def drawn_box(view):
-    """The box that ParaView crops the view's only volume with, whatever it makes of scale and origin."""
+    """The box by which ParaView crops the view's only volume, however it applies scale and
+    origin."""
     volumes = view.GetClientSideObject().GetRenderer().GetVolumes()
     volumes.InitTraversal()
     return np.array(volumes.GetNextProp().GetMapper().GetCroppingRegionPlanes())

@@ -43,14 +43,15 @@ def filter_of(source, association="POINTS", name="ball", **properties):
 
 def errors_of(proxy):
     with Messages("ErrorEvent") as texts:
-        proxy.UpdatePipeline(0.0)  # with a time, since ParaView skips an update without when nothing has changed
+        # With a time: without one, ParaView skips the update when nothing has changed.
+        proxy.UpdatePipeline(0.0)
     return "\n".join(texts)
 
 
 source = producer_of(field([7, 0, -3]))
 proxies = []
 
-# The camera that nobody set is ParaView's.
+# An unset camera is ParaView's.
 image = filter_of(source)
 seen = picture(image)
 renderer = vtkRenderer()
@@ -71,7 +72,7 @@ made = filter_of(source, CameraPosition=[15, 4, 4], CameraFocalPoint=[7, 0, -3])
 check(np.abs(picture(simple.RenderVDI(Input=made)).astype(int) - picture(made)).max() <= 2,
       "RenderVDI without a camera looks from where the VDI was made")
 
-# Viewpoints that show nothing true.
+# Viewpoints from which the picture isn't true.
 for what, position, focal_point, word in (
         ("inside the scene", [7.1, 0, -3], [7, 0, -4], "inside"),
         ("that looks past it", [15, 4, 4], [15, 40, 4], "doesn't see"),
@@ -109,7 +110,7 @@ for association, name, words in (
 check(not errors_of(filter_of(source, "CELLS", "layers")), "an array of cells is fine")
 
 
-# Colour maps: the default keeps its first range, whoever updates; set points stay.
+# Colour maps: the default keeps its first range, whatever updates the filter; set points stay.
 def range_of(name):
     points = list(simple.GetColorTransferFunction(name).RGBPoints)
     opacities = list(simple.GetOpacityTransferFunction(name).Points)

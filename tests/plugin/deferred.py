@@ -1,5 +1,6 @@
-"""Views that are deferred as in ParaView's window, but without it: such a view shows the VDI made last until the next one is
-prepared, new blocks included; everybody else gets the one that was asked for. On any number of ranks."""
+"""Views that are deferred as in ParaView's window, but without the window. Such a view shows the
+last VDI until the next one is prepared, new blocks included. All other consumers get the requested
+VDI. On any number of ranks."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""A source that's distributed by ParaView itself: N ranks against one.
+"""A source that ParaView itself distributes: N ranks against one.
 
 Usage: distributed.py write|compare. `write` (1 rank) makes the pictures to compare with. Nothing is updated before the VDI
 asks for it, since an earlier update would hide a wrong request."""
@@ -68,7 +68,8 @@ check(extracted["white"].min() < 200 and (extracted["white"][extracted[20].max(a
 
 
 def prepare(image):
-    """Prepares the VDI as the window does: the ranks progress while they are asked to."""
+    """Prepares the VDI as the window does: the ranks progress only while the client asks them
+    to."""
     image.SMProxy.InvokeCommand("Prepare")
     percent = image.GetProperty("Preparation")
     for _ in range(100000):
@@ -101,7 +102,7 @@ image.SamplingRate = 2
 picture(image)
 image.SamplingRate = 0
 check(np.array_equal(picture(image), taken), "an update without a preparation makes the same VDI")
-# A preparation that is given up, and one whose filter is deleted before it ends.
+# A preparation that is cancelled, and one whose filter is deleted before it ends.
 image.Supersegments, image.Resolution, image.SamplingRate = 40, [400, 300], 4
 image.SMProxy.InvokeCommand("Prepare")
 image.SMProxy.InvokeCommand("Hold")

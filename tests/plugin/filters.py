@@ -1,4 +1,4 @@
-"""The filters, reader, writer and extractor as a script's author uses them, and what bad input gets."""
+"""The filters, reader, writer and extractor as a script's author uses them, also with bad input."""
 
 import json
 import os

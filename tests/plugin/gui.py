@@ -60,8 +60,8 @@ def use():
 
 
 class Later:
-    """Steps after the end of the script, in the window's event loop. Each is asked for again and again until it returns True,
-    for at most 30 seconds."""
+    """Steps after the end of the script, in the window's event loop. Each step is called repeatedly
+    until it returns True, for at most 30 seconds."""
 
     def __init__(self, view, steps):
         self.steps, self.since, self.looks = steps, time.monotonic(), False

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Starts the real ParaView with the plugin in a virtual screen (run it through xvfb-run), lets gui.py use it, takes a picture
-# of the whole window, and ends it. Needs VDI_PLUGIN and VDI_TEST_OUTPUT.
+# Starts the real ParaView with the plugin on a virtual screen (run this through xvfb-run), lets
+# gui.py use it, takes a picture of the whole window, and ends ParaView. Needs VDI_PLUGIN and
+# VDI_TEST_OUTPUT.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 done_file=$VDI_TEST_OUTPUT/gui.done

@@ -1,4 +1,5 @@
-"""Blocks dealt to ranks at random: our picture on N ranks is that of one rank, whatever ParaView's own rendering does.
+"""Blocks assigned to ranks at random: our picture on N ranks is that of one rank, whatever
+ParaView's own rendering does.
 
 Usage: headline.py write|compare. `write` (1 rank) makes the pictures to compare with; `compare` (several ranks) compares
 and leaves headline.png: one rank, ours on several, ParaView's on several."""

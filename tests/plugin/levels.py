@@ -94,7 +94,7 @@ for ratio in (2, 4):
     worst = np.abs(picture_of(blocks) - truth).max()
     check(worst <= 2, "refined cells under a finer block, ratio %d: the picture of a uniform grid, off by %d" % (ratio, worst))
 
-# Hidden cells and points aren't drawn, and don't bleed into what's beside them.
+# Hidden cells and points aren't drawn, and don't bleed into their neighbours.
 n = 16
 half = np.zeros((n, n, n))
 half[:, :, n // 2:] = HIDDEN_CELL

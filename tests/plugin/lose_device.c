@@ -42,7 +42,7 @@ VKAPI_ATTR VkResult VKAPI_CALL vkCreateDevice(VkPhysicalDevice physical, const V
   return create(physical, info, allocator, device);
 }
 
-/* A new device may get the address of one that has gone. */
+/* A new device may get the address of one that was destroyed. */
 VKAPI_ATTR void VKAPI_CALL vkDestroyDevice(VkDevice device, const VkAllocationCallbacks* allocator) {
   const PFN_vkDestroyDevice destroy = (PFN_vkDestroyDevice)dlsym(RTLD_NEXT, "vkDestroyDevice");
   for (int i = 0; i < lost_count; ++i) {

@@ -1,6 +1,6 @@
-"""A rank of several loses its Vulkan device while a VDI is made (lose_device.c). All ranks start anew,
-and the VDI is made in the same update. Where every device is lost the filter fails, and the next update
-works again."""
+"""One of several ranks loses its Vulkan device while a VDI is made (lose_device.c). All ranks start
+anew, and the VDI is made in the same update. Where every device is lost the filter fails, and the
+next update works again."""
 
 import os
 

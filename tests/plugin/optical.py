@@ -1,6 +1,6 @@
-"""The optical model alone, in double precision: emission and absorption along a ray through a trilinear field. It shares
-nothing with the product: no table of samples, no slabs, no blocks, no shader. VTK's own functions give colours
-and opacities."""
+"""The optical model alone, in double precision: emission and absorption along a ray through a
+trilinear field. It shares nothing with the product: no table of samples, no slabs, no blocks, no
+shader. VTK's own functions give colours and opacities."""
 
 import functools
 

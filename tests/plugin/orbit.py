@@ -33,7 +33,7 @@ def interactive_seconds(view, frames, degrees):
 
 
 def shown(source, size):
-    """A view of that size, whose first picture is a small one, because it moves the camera."""
+    """A view of that size. Its first picture is a small one, because it moves the camera."""
     view = pvtest.make_view([64, 36], [2.2, 1.4, 2.0], CENTER)
     simple.Show(source, view)
     simple.Render(view)
@@ -64,7 +64,7 @@ def fluid():
 
 
 def recognisable():
-    """A part of a fine structure, from the side, can be recognised at any frame rate."""
+    """Part of a fine structure, seen from the side, can be recognised at any frame rate."""
     reader = simple.OpenDataFile(make("orbit_coil.vdi", "--size", "96x96x96", "--resolution", "960x540", "--azimuth", "0",
                                       field="coil"))
     view = shown(reader, SIZE)

@@ -46,7 +46,7 @@ def look(view, camera):
 
 
 def seen_box(rgb):
-    """First and last row and column with something in it."""
+    """First and last row and column that aren't empty."""
     rows, columns = np.nonzero(rgb.max(axis=2) > 8)
     return [rows.min(), rows.max(), columns.min(), columns.max()]
 

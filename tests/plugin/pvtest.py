@@ -1,4 +1,5 @@
-"""Shared by the pvbatch tests: the plugin, sources that deal blocks to ranks, pictures and their comparison.
+"""Shared by the pvbatch tests: the plugin, sources that assign blocks to ranks, pictures and their
+comparison.
 
 Run by ctest through xvfb-run; VDI_PLUGIN names the plugin, VDI_TEST_OUTPUT a folder for pictures. With several ranks only
 rank 0 runs the test script; sources run on all ranks, inside Programmable Source."""
@@ -305,7 +306,7 @@ def wrong_share(a, b, object_only=None):
 
 
 class Messages:
-    """The texts of VTK's events, errors or warnings, while it's entered."""
+    """The texts of VTK's events, errors or warnings, while this context is entered."""
 
     def __init__(self, *events):
         self.events, self.texts = events, []

@@ -44,7 +44,7 @@ for kind in ("VDI", "Outline", "Slice"):
     simple.SaveData(os.path.join(pvtest.OUTPUT, "recovery_{}.vdi".format(kind)), proxy=image)
     simple.Delete(view)
 
-# A single file that is damaged and made whole again.
+# A single file that is damaged and then repaired.
 whole = os.path.join(pvtest.OUTPUT, "recovery_VDI.vdi")
 path = shutil.copy(whole, os.path.join(pvtest.OUTPUT, "recovery_file.vdi"))
 reader = simple.OpenDataFile(path)

@@ -1,5 +1,6 @@
-"""The representation VDI: against the representation Volume at the viewpoint of generation, alone and with an opaque object in
-it; against `vdi render` of other cameras; what Show alone shows."""
+"""The representation VDI: compared with the representation Volume at the VDI's viewpoint, alone and
+with an opaque object in it; compared with `vdi render` for other cameras; and shown by Show
+alone."""
 
 import os
 import subprocess
@@ -100,7 +101,7 @@ def elsewhere():
     large = pvtest.screenshot(view, "representation_large.png", [2 * SIZE[0], 2 * SIZE[1]]).astype(float)
     small = large.reshape(SIZE[1], 2, SIZE[0], 2, 3).mean(axis=(1, 3)).astype(np.uint8)
     compare(small, screenshot(view, "small"), 0.98, "a picture larger than the window")
-    # A translucent object is drawn by peeling. Beside the VDI, it changes nothing of it.
+    # A translucent object is drawn by peeling. It doesn't change a VDI beside it.
     sphere = simple.Sphere(Radius=6, Center=[0, -120, 0], PhiResolution=32, ThetaResolution=32)
     translucent = simple.Show(sphere, view)
     translucent.Opacity, translucent.DiffuseColor = 0.5, [0, 0, 1]
@@ -137,7 +138,7 @@ def window_column(view, source):
     simple.Show(source, view)
     simple.Render(view)  # the first picture of a view moves its camera
     view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = CAMERA, CENTER, [0, 1, 0]
-    for _ in range(2):  # the window is late to know which eye it is
+    for _ in range(2):  # the window learns late which eye it is
         simple.Render(view)
     seen = pvtest.pixels(view.GetRenderWindow(), front=0)
     simple.Hide(source, view)

@@ -1,6 +1,6 @@
-"""The representation VDI where there is nothing to show: a series whose steps differ and of which one is damaged and one
-missing, an empty VDI, data that are no VDI; and viewpoints that show nothing of a VDI, or nothing true. The view
-says what is wrong, and shows the next good frame."""
+"""The representation VDI where there is nothing to show: a series whose steps differ, with one
+damaged step and one missing; an empty VDI; and data that aren't a VDI. Also viewpoints that show
+nothing of a VDI, or nothing true. The view reports the fault, and shows the next good frame."""
 
 import os
 import shutil

@@ -76,7 +76,8 @@ vectors.SelectInputScalars = ["POINTS", "force"]
 check(not errors_of(vectors) and range_of(vectors.LookupTable) == [0, 5] and vectors.Component == 2,
       "rank %d: another array's component has its range %s" % (rank, range_of(vectors.LookupTable)))
 
-# A component that only one rank's script sets is an error, and nobody waits for the rank that sets nothing.
+# A component that only one rank's script sets is an error, and no rank waits for those that set
+# none.
 if rank == 0:
     vectors.Component = 0
 with Messages("ErrorEvent") as texts:

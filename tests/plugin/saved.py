@@ -1,4 +1,5 @@
-"""Tests what ParaView saves of a filter: the defaults of later filters, and scripts that make the same VDI anew."""
+"""Tests the settings of a filter that ParaView saves: as defaults of later filters, and in scripts
+that make the same VDI anew."""
 
 import re
 
@@ -58,7 +59,8 @@ DISPLAY = dict(Shade=1, Diffuse=0.6, UseCropping=1, CroppingScale=[0.5, 0.6, 0.7
 
 
 def sets(script, name, setting):
-    """Whether the script sets the property, by itself or, as from ParaView 6 on, with others by Set."""
+    """Whether the script sets the property, alone or, as from ParaView 6 on, together with others
+    by Set."""
     together = "".join(re.findall(r"^%s\.Set\((.*?)^\)" % name, script, re.MULTILINE | re.DOTALL))
     return bool(re.search(r"^%s\.%s = " % (name, setting), script, re.MULTILINE) or
                 re.search(r"^ *%s=" % setting, together, re.MULTILINE))

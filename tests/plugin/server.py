@@ -33,8 +33,9 @@ def start_reverse(port, **options):
 
 
 def end(process, patience=20):
-    """Ends a process of ParaView's. ParaView prints its stack when it gets SIGTERM, and locks up if it was allocating
-    memory just then, as it does when a client has left it. It is killed after `patience` seconds."""
+    """Ends one of ParaView's processes. When ParaView gets SIGTERM, it prints its stack, and locks
+    up if it was just allocating memory, as it does when a client has left it. After `patience`
+    seconds, it is killed."""
     process.terminate()
     try:
         process.wait(patience)

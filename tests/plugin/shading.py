@@ -1,5 +1,5 @@
-"""Shaded volumes: our volume rendering and our VDI, seen from its viewpoint, against ParaView's own pictures. And the display
-properties and lights that the first update takes."""
+"""Shaded volumes: compares our volume rendering, and our VDI from its viewpoint, with ParaView's
+own pictures. Also tests which display properties and lights the first update takes."""
 
 import numpy as np
 from pvtest import *  # noqa: F403

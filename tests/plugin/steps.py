@@ -57,7 +57,7 @@ def frame(view):
 
 
 def picture_alone(path):
-    """The picture of a file, by a reader and a view of its own."""
+    """The picture of a file, made by a separate reader and view."""
     alone = simple.OpenDataFile(path)
     view = make_view()
     simple.Show(alone, view)
@@ -171,7 +171,7 @@ simple.ReloadFiles(reader)
 check(same(screenshot(view, "whole"), expected[15 % KINDS]) and not pvtest.message_in(view),
       "a file that is whole again is shown once it is read again")
 
-# By mouse: a step requests a still frame, which must not hold up a user who is moving the camera.
+# By mouse: a step requests a still frame, which must not delay a user who is moving the camera.
 interactor = vtkGenericRenderWindowInteractor()
 view.SMProxy.SetupInteractor(interactor)
 view.ViewTime = times[8]

@@ -1,4 +1,5 @@
-"""The extractor VDIStream: what a simulation's script offers is what a viewer gets. The argument tells runs apart."""
+"""The extractor VDIStream: a viewer gets what a simulation's script offers. The argument tells runs
+apart."""
 
 import gc
 import os

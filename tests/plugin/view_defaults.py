@@ -95,7 +95,8 @@ simple.SaveState(state_file)
 for what, load in (("trace", lambda: exec(trace, {})), ("state", lambda: simple.LoadState(state_file))):
     simple.ResetSession()
     load()
-    simple.GetOpacityTransferFunction("twice").Points = OPACITY  # traces have what was set in the window, not by scripts
+    # Traces record settings of the window, not of scripts.
+    simple.GetOpacityTransferFunction("twice").Points = OPACITY
     again = simple.FindSource("vdi")
     check(again is not None, "a %s makes the filter again" % what)
     different = [a for a, b in zip(taken(again), values) if a != b]
@@ -148,7 +149,7 @@ for what in ("while edits rest", "while a VDI is made"):
     again.SMProxy.InvokeCommand("Prepare")
 again.SMProxy.InvokeCommand("Release")
 
-# An edit gives up the work that the previous one began, and doesn't wait for it.
+# An edit cancels the work that the previous one began, and doesn't wait for it.
 again.Supersegments, again.Resolution, again.SamplingRate = 40, [1200, 900], 4
 simple.GetOpacityTransferFunction("twice").Points = [80, 0, 0.5, 0, 550, 0.4, 0.5, 0]
 again.SMProxy.InvokeCommand("Prepare")

@@ -19,7 +19,7 @@ FIRST_ANSWER_SECONDS, ANSWER_SECONDS, ANSWER_SHARE = 2.5, 1.25, 0.3
 
 
 def made(array, step):
-    """Whether the filter has the VDI of that array and step, and nothing is asked for beyond it."""
+    """Whether the filter has the VDI of that array and step, and no other VDI is requested."""
     now = inside("output_now()")
     return not now["outdated"] and now["array"] == array and now["time"] == step
 
@@ -49,7 +49,7 @@ def first_apply(window):
 
 
 def others_wait(window):
-    """Callers other than views get the VDI that was asked for."""
+    """Callers other than views get the requested VDI."""
     window.click("Undo Apply")
     wait_for("state from before", lambda: window.is_enabled("Apply"))
     window.click("Apply")
@@ -76,7 +76,7 @@ def choose_array(window, item):
 
 
 def given_up_step(window):
-    """An edit gives up the VDI of a time step: the step is made all the same, with that edit."""
+    """An edit cancels the VDI of a time step. The step is still made, with that edit."""
     window.click("Next Frame")
     wait_for("word of the VDI", lambda: inside("output_now()")["outdated"])
     inside("edit_opacity(0.6)")

@@ -1,5 +1,6 @@
 """Runs inside the real ParaView (--script): loads the plugin, shows a volume of two arrays and four time steps, and says
-"ready". From then on it answers what beside.py asks of it. The data are made once: what is measured is the VDI's time."""
+"ready". From then on it answers the calls of beside.py. The data are made once, so the tests
+measure the time of the VDI alone."""
 
 import os
 import sys

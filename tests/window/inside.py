@@ -17,7 +17,7 @@ def leave(name, text):
 
 
 def answer(interactor, names):
-    """From now on, evaluates the expression in the file "do", and writes the result to "done"."""
+    """From now on, evaluates each expression in the file "do", and writes its result to "done"."""
     def obey(*_):
         path = os.path.join(OUTPUT, "do")
         if not os.path.exists(path):

@@ -99,7 +99,7 @@ def two_views():
         assert makings == made, "VDIs are made again and again: {} instead of {}".format(makings, made)
 
     inside("activate(0)")
-    time.sleep(2)  # what the script has changed is made
+    time.sleep(2)  # until the VDI has the script's changes
     inside("forget_makings()")
     inside("turn_auto(1)")
     wait_for_making(0, 1)

@@ -26,7 +26,7 @@ for name in ("position", "focal-point", "view-up") if not opened else ():
 subprocess.run(command, check=True)
 seen = pvtest.read_png(os.path.join(pvtest.OUTPUT, "view.png"))
 expected = pvtest.read_png(expected_path)
-legend = int(0.84 * seen.shape[1])  # where the view's colour bar begins, which the tool has none of
+legend = int(0.84 * seen.shape[1])  # where the view's colour bar begins; the tool draws none
 likeness = pvtest.ssim(seen[:, :legend], expected[:, :legend])
 print("the view, against the tool's picture: SSIM {:.4f}".format(likeness))
 check(expected.std() > 10 and likeness > 0.99, "the view shows what the tool renders for its camera")

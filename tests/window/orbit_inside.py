@@ -1,5 +1,5 @@
-"""The calls that orbit.py makes inside ParaView (orbit_notes.py), without the mouse: each returns at once, and its effect shows
-in the window by itself."""
+"""The calls that orbit.py makes inside ParaView (orbit_notes.py), without the mouse. Each returns
+at once, and its effect then shows in the window."""
 
 import numpy as np
 import pvtest
@@ -145,7 +145,7 @@ def show_made():
 
 
 def is_held():
-    """Whether a VDI is being made in the background, or is about to be."""
+    """Whether a VDI is being made in the background, or will be soon."""
     proxy = shown["vdi"].SMProxy
     proxy.UpdatePropertyInformation()
     return proxy.GetProperty("Held").GetElement(0) == 1
@@ -157,8 +157,9 @@ def screenshot(name):
 
 
 def edit_and_capture(peak, prepares):
-    """A screenshot at once after an edit of the opacity, or when the VDI is being made. Whether the window was held until then,
-    and whether the picture differs from the one before the edit."""
+    """Takes a screenshot right after an edit of the opacity, or when the VDI is being made. Returns
+    whether the window was held until then, and whether the picture differs from the one before the
+    edit."""
     before = screenshot("before_edit.png")
     pvtest.set_colors("RTData", 40, 270, peak)
     if prepares:

@@ -41,7 +41,8 @@ def check_like_volume(volume, vdi):
 
 
 def regenerate_before_apply(window):
-    """The button sets the camera for the first Apply; undone here, so that Apply takes it by itself."""
+    """The button sets the camera for the first Apply. This test undoes that, so that Apply itself
+    takes the camera."""
     unset = window.values()
     window.click("Regenerate From This View")
     values = wait_for("camera of the view", lambda: window.values() != unset and window.values())
@@ -67,7 +68,8 @@ def estimates(window, begin):
 
 
 def saved(window, name):
-    """The bytes of the VDI's file, which doesn't stay: it would make the lists of files longer."""
+    """The bytes of the VDI's file. The file is removed, because it would make the lists of files
+    longer."""
     window.save("Save Data...", path(name))
     data = bytes_of(path(name))
     os.remove(path(name))
@@ -205,7 +207,7 @@ def first_session(window):
         window.screenshot("7_making.png")
         window.drag((right, top + 90), (right, top + 60), steps=15)
         wait_for("newer VDI", lambda: window.is_making(panel), 30)
-    window.save("Save Data...", path("making"), extension=".vdi")  # what Save Data begins with
+    window.save("Save Data...", path("making"), extension=".vdi")  # the name that ParaView proposes
     wait_for("end of making the VDI", lambda: not window.is_making(panel), 120)
     time.sleep(1)
     window.save("Save Data...", path("made.vdi"))
@@ -213,7 +215,7 @@ def first_session(window):
     window.screenshot("8_edited.png")
     print("two colour edits, one while a VDI is made: the window took at most %.3f s to answer" % pulse.longest, flush=True)
     check(pulse.longest <= ANSWER_SECONDS, "an edit doesn't freeze the window")
-    window.select(0)  # nothing is shown of that
+    window.select(0)  # the server, which has no properties in the panel
     check(not window.has(COLOR_EDITOR, "dialog"), "the editor closes where nothing is shown")
     window.select(2)
     panel = window.find("Properties", "frame")

@@ -25,7 +25,8 @@ def black_background(window):
 
 
 def check_view(window, vdi, name):
-    """`name`: of the step, a screenshot of which is left. On a busy machine the picture in full may take a while."""
+    """`name`: that of the step, of which a screenshot is left. On a busy machine the full picture
+    may take a while."""
     window.save("Save State...", path(name + ".pvsm"))
     end = time.monotonic() + 60
     while True:
@@ -45,7 +46,7 @@ def edit_opacity(window):
     before = window.pixels()
     with Pulse(window) as pulse:
         window.drag(point, (point[0], point[1] + 60), steps=15, seconds=1)
-        # A small one is soon made: nobody may look in time.
+        # A small one is made so soon that the test may not look in time.
         wait_for("new VDI", lambda: window.is_making(panel) or window.pixels() != before, 60)
         window.screenshot("3_making.png")
         wait_for("end of making the VDI", lambda: not window.is_making(panel), 200)

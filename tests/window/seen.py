@@ -1,5 +1,5 @@
-"""Compares a view of the window with the tool's picture of the same VDI for that camera. A state file, saved by mouse, has the
-camera."""
+"""Compares a view of the window with the tool's picture of the same VDI for that camera. The camera
+comes from a state file that was saved by mouse."""
 
 import os
 import subprocess

@@ -33,7 +33,8 @@ DOCKS = ("frame", "panel")  # roles of dock widgets: the one up to Qt 6.8, and t
 
 
 def wait_for(what, action, seconds=SECONDS):
-    """The first result of `action` that is true; AssertionError that names `what` when there is none in time."""
+    """The first true result of `action`. Raises AssertionError, which names `what`, if there is
+    none in time."""
     end = time.monotonic() + seconds
     while True:
         result = action()
@@ -59,7 +60,8 @@ def ssim(one, other):
 
 
 def output_folder(name):
-    """A folder of VDI_TEST_OUTPUT, which is made anew: what another run left would make the lists of files longer."""
+    """A folder of VDI_TEST_OUTPUT, made anew: files of another run would make the lists of files
+    longer."""
     path = os.path.join(os.environ["VDI_TEST_OUTPUT"], name)
     shutil.rmtree(path, ignore_errors=True)
     os.makedirs(path)
@@ -101,8 +103,9 @@ class Inside:
 class Session:
     """A D-Bus session for one ParaView, in a runtime folder of its own.
 
-    ParaView has to be started before anybody asks for the accessibility bus. Where that bus exists first, Debian's Qt 5.15.8
-    (a11y_root.diff) may register its objects before it is connected, and then never answers."""
+    ParaView has to start before anything requests the accessibility bus. If that bus exists first,
+    Debian's Qt 5.15.8 (a11y_root.diff) may register its objects before it is connected, and then
+    never answers."""
 
     def __init__(self):
         self.folder = tempfile.mkdtemp(prefix="vdi-window-")  # short: sockets have names of at most 108 characters
@@ -260,7 +263,7 @@ class Server:
 
 
 class Window:
-    """ParaView's main window, without settings of the user's and without our plugin."""
+    """ParaView's main window, without the user's settings and without our plugin."""
 
     def __init__(self, screen, *arguments, output=".", folder=None):
         """`output`: the folder of screenshots and of the log; `folder`: the one that ParaView's file dialogs show first."""
@@ -273,7 +276,7 @@ class Window:
         os.makedirs(home)
         self.session = Session()
         environment = dict(self.session.environment, HOME=home, QT_LINUX_ACCESSIBILITY_ALWAYS_ON="1", LC_ALL="C.UTF-8")
-        environment.pop("PV_PLUGIN_CONFIG_FILE", None)  # ParaView loads at once what is named there
+        environment.pop("PV_PLUGIN_CONFIG_FILE", None)  # ParaView loads the plugins that it names
         if sys.version_info >= (3, 13):
             # With that Python, Debian's ParaView 5.13 crashes if its Script Editor finds pygments, but not ParaView's
             # own formatter for pygments.
@@ -334,7 +337,7 @@ class Window:
         """All visible widgets, outermost first; with `hidden`, the others as well."""
         try:
             children = (node or self.root).children()
-        except GLib.Error:  # it went while it was looked at
+        except GLib.Error:  # it vanished during the query
             return
         for child in children:
             try:
@@ -373,7 +376,8 @@ class Window:
         return self.find(name, role).has(Widget.ENABLED)
 
     def text_that_begins(self, begin, within=None):
-        """The visible text, of a label or an editor, that begins so; None if there is none."""
+        """The visible text of a label or an editor that starts with `begin`; None if there is
+        none."""
         for widget in self.widgets(within):
             try:
                 text = widget.text if widget.role == "text" else widget.name
@@ -520,7 +524,8 @@ class Window:
             self.click(place)
 
     def _place_in_submenu(self, above, name):
-        """The place of an action that ParaView has in two menus: Qt tells its place in the other one."""
+        """The place of an action that ParaView has in two menus; Qt reports its place in the other
+        one."""
         submenu = self.find(above, "menu item", 5)
         names = [widget.name for widget in self.widgets(submenu, hidden=True) if widget.role == "menu item"]
         x, y, width, height = submenu.box
@@ -592,7 +597,7 @@ class Window:
         self.click("Save")
         dialog = self.find("Choose Server Configuration", "dialog")
         self.click(self.find("Connect", "push button", within=dialog))
-        self.find("Plugin Manager", "dialog", 60)  # ParaView opens it by itself
+        self.find("Plugin Manager", "dialog", 60)  # ParaView opens it on its own
         self.load_plugin(plugin)
         if self.has("Output Messages", "frame"):  # one says that this ParaView keeps no list of servers
             self.click(self.find("Close", within=self.find("Output Messages", "frame")))
@@ -674,8 +679,8 @@ class Window:
 
 
 class Pulse:
-    """Asks the window something over and over while it is entered: `longest` is the longest time, in seconds, that its
-    event loop took to answer."""
+    """Queries the window repeatedly while this context is entered. `longest` is the longest time,
+    in seconds, that the window's event loop took to answer."""
 
     def __init__(self, window):
         self.pid, self.longest, self.stop = window.process.pid, 0.0, threading.Event()
