@@ -1,5 +1,5 @@
-# The dependencies between folders point one way, VTK and MPI stay where they belong, and two files ask for
-# ParaView's version. Run with -DSOURCE_DIR=...
+# The dependencies between folders point one way, VTK and MPI stay where they belong, and only two
+# files ask for ParaView's version. Run with -DSOURCE_DIR=...
 cmake_minimum_required(VERSION 3.25)
 set(errors "")
 set(folders "")

@@ -141,7 +141,7 @@ inline std::vector<NamedFunction> namedFunctions(const Stretch& stretch) {
 struct Off {
   double largest = 0.0;
   double mean = 0.0;    // mean of the worst channel
-  double pixels = 0.0;  // share of them with a channel that's off by more than 8
+  double pixels = 0.0;  // share of them with a channel that is off by more than 8
 };
 
 inline Off offBetween(const Image& a, const Image& b) {

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# The tool as a user runs it: what works, and what bad input gets. $1: vdi, $2: mpirun and its options, as one word list.
+# The tool as a user runs it, with good input and with bad. $1: vdi, $2: mpirun and its options, as
+# one word list.
 set -uo pipefail
 vdi=$1
 read -r -a mpirun <<<"$2"
@@ -72,7 +73,7 @@ compared "isosurface: ranks differ" "c['ssim'] > 0.999" blend_one.png blend_thre
 refused 2 "at least one isovalue" "$vdi" generate --field mixing "${small[@]}" --blend isosurface --dvr x.png
 refused 2 "need blend mode isosurface" "$vdi" generate --field mixing "${small[@]}" --isovalues 0.5 --dvr x.png
 refused 2 "composite, maximum, minimum or isosurface" "$vdi" generate --field mixing "${small[@]}" --blend mip --dvr x.png
-# A page of VDIs is the same each time; where it can't be made, the file stays as it was.
+# A page of VDIs is the same each time. If it can't be made, the file stays as it was.
 works "export" "$vdi" export one.vdi three.vdi -o page.html --title "<Two>"
 grep -q '<title>&lt;Two&gt;</title>' page.html || fail "the page's title isn't escaped"
 [ "$(grep -c 'class="vdi-frame"' page.html)" -eq 2 ] || fail "a page of two VDIs doesn't have two frames"
@@ -203,7 +204,7 @@ refused 2 "step.*whole" "$vdi" generate --field sphere "${small[@]}" --step 1844
 refused 2 "exceeds" "$vdi" generate --raw s0.json s1.json --step 18446744073709551615 -o x.vdi
 refused 2 "finite" "$vdi" generate --field sphere "${small[@]}" --time nan -o x.vdi
 
-# Each viewpoint that can't show the VDI truly gets one warning.
+# Each viewpoint from which the picture isn't true gets one warning.
 warnings() { grep -c "warning.*$1" err.txt; }
 works "no warning" "$vdi" render one.vdi -o x.png --azimuth -50 0 50
 [ ! -s err.txt ] || { fail "there is a warning of a viewpoint near V_O"; cat err.txt; }

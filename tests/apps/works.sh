@@ -19,7 +19,7 @@ says() {
   shift
   grep -qiE "$pattern" err.txt || { fail "no '$pattern' in what is said of: $*"; cat err.txt; }
 }
-# refused <status> <pattern> command...: that exit status, one line that matches.
+# refused <status> <pattern> command...: that exit status, and one line that matches.
 refused() {
   local status=$1 pattern=$2
   shift 2
@@ -28,7 +28,7 @@ refused() {
   [ $got -eq "$status" ] || fail "status $got, not $status: $*"
   says "$pattern" "$@"
 }
-# fails <pattern> command...: any exit status but 0, one line that matches.
+# fails <pattern> command...: any exit status but 0, and one line that matches.
 fails() {
   local pattern=$1
   shift

@@ -1,4 +1,4 @@
-// A condition's measures are those of the whole field, however it is dealt to ranks.
+// A condition's measures are those of the whole field, however it is distributed over ranks.
 #include <array>
 #include <cmath>
 #include <cstdint>

@@ -1,6 +1,6 @@
 // A simulation whose last rank runs out of memory within the adaptor. In each call, some allocations of the
-// adaptor's own code fail, one at a time. The call must report that on all ranks or do without the memory.
-// The process goes on, no rank is left waiting, and the next call works.
+// adaptor's own code fail, one at a time. The call must report the failure on all ranks, or do
+// without the memory. The process goes on, no rank is left waiting, and the next call works.
 //
 // catalyst_allocations [growth [script]]: after allocation n, allocation growth * n + 1 fails; 1.0 tries all.
 // Without a script the run is described by JSON.

@@ -7,7 +7,7 @@
 // RUN is a JSON text or the name of a script. The arrays have different orders in memory: interleaved cells,
 // points within a halo, and cells of vectors whose components lie apart. `bad` hands over faulty nodes, most
 // of them on one rank only, and then a sound mesh. `lost` hands over meshes to a run whose processes die.
-// Exit status 0 if all calls returned what they should.
+// Exit status 0 if all calls returned the expected codes.
 #include <mpi.h>
 
 #include <algorithm>

@@ -38,7 +38,7 @@ SAYS = ["has neither scripts nor vdi/json",
 
 
 def run(folder, *command, **environment):
-    """The command's output, run in a new folder."""
+    """The output of a command that runs in a new folder."""
     shutil.rmtree(folder, ignore_errors=True)
     os.makedirs(folder)
     done = subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=100,

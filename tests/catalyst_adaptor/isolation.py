@@ -79,7 +79,7 @@ class Run:
         assert not self.left_behind(), self.left_behind()
 
     def left_behind(self):
-        """Processes of the run that are still there some seconds after it."""
+        """Processes of the run that still exist some seconds after it."""
         for _ in range(100):
             left = [path for path in glob.glob("/proc/[0-9]*/environ") if is_of_run(path, self.name)]
             if not left:
@@ -103,7 +103,8 @@ def one_line(run, pattern):
 
 
 def dies(stage, during, how="kill", cause=r"was killed by signal 9 \(Killed\)", rank=LAST):
-    """The adaptor prints one line and makes no more frames. Later steps fail at once, or aren't wanted."""
+    """The adaptor prints one line and makes no more frames. Later steps fail at once, or aren't
+    wanted."""
     run = Run({}, 8, VDI_TEST_PAUSE="300", **dying(stage, how, rank))
     one_line(run, "rank %d: the process that makes frames %s while it (%s).*no more frames" % (rank, cause, during))
     first = run.codes.index(ENGINE)

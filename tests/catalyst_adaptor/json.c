@@ -69,7 +69,7 @@ static void begin_alarms(void) {
   setitimer(ITIMER_REAL, &often, NULL);
 }
 
-/* A child stops this process soon, and lets it go on after some milliseconds. */
+/* A child stops this process soon, and resumes it after some milliseconds. */
 static pid_t stop_soon(int milliseconds) {
   const pid_t child = fork();
   if (child != 0) return child;

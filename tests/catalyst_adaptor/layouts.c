@@ -1,11 +1,12 @@
 /* A simulation whose field lies in memory as real codes' fields do. Arguments: a JSON text or the name of a
  * script, the cells along each axis, the layouts' names, which are the arrays' names too, separated by
- * commas, and the number of steps. Each rank has a part, as MPI_Dims_create says. All bytes that belong to no
- * value are NaN. Odd ranks lack the array "partial", and have one of another name instead of "elsewhere".
- * If the first name is "star_mirror" or "star_periodic", blocks have a ghost layer on all sides, also beyond
- * the domain, and those at edges and corners are NaN, as of PETSc's DMDA with a star stencil.
- * The process takes the same memory for any one layout, so that what the adaptor takes can be seen. It prints
- * the bytes of the field. Exit status 0 if all went well. */
+ * commas, and the number of steps. Each rank has a part, which MPI_Dims_create determines. All
+ * bytes that belong to no value are NaN. Odd ranks lack the array "partial", and have one of
+ * another name instead of "elsewhere". If the first name is "star_mirror" or "star_periodic",
+ * blocks have a ghost layer on all sides, also beyond the domain, and those at edges and corners
+ * are NaN, as in PETSc's DMDA with a star stencil. The process takes the same memory for each
+ * layout, which shows how much the adaptor takes. It prints the bytes of the field. Exit status 0
+ * if all went well. */
 #include <math.h>
 #include <mpi.h>
 #include <stdio.h>

@@ -98,7 +98,7 @@ int main(int argc, char** argv) {
   if (execute(NULL, 1, 0.0) != VDI_CATALYST_BAD_ARGUMENT || error(NULL)[0] != '\0')
     fail("a null handle was taken");
 
-  feenableexcept(FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW); /* as simulations do that look for errors */
+  feenableexcept(FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW); /* as simulations do to find errors */
   FILE* said = tmpfile();
   const int terminal = dup(STDERR_FILENO);
   fflush(stderr);

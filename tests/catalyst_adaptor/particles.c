@@ -1,9 +1,10 @@
-/* A simulation of particles: a hump of them moves through the unit cube, whose 2 x 2 x 2 blocks of 8 cells
- * per axis are dealt to the ranks in one way and the particles in another. The last of several ranks has
- * none. Arguments: a JSON text or file (or a script, which ends in .py), then the code that each step must
- * return. The array's name is V. Exit status 0 if all calls return what they should. VDI_TEST_FAULTS=1: there
- * are also particles that can't be deposited. VDI_TEST_LENGTHS=1: half of the particles have smoothing
- * lengths of two cells, and the array's values lie off the middles of cells. */
+/* A simulation of particles: a hump of them moves through the unit cube, whose 2 x 2 x 2 blocks of
+ * 8 cells per axis are assigned to the ranks in one way and the particles in another. The last of
+ * several ranks has no particles. Arguments: a JSON text or file (or a script, which ends in .py),
+ * then the code that each step must return. The array's name is V. Exit status 0 if all calls
+ * return what they should. VDI_TEST_FAULTS=1: there are also particles that can't be deposited.
+ * VDI_TEST_LENGTHS=1: half of the particles have smoothing lengths of two cells, and the array's
+ * values lie off the middles of cells. */
 #include <math.h>
 #include <mpi.h>
 #include <stdlib.h>
@@ -103,7 +104,7 @@ static int refuse_bad(vdi_catalyst* catalyst, int rank, int ranks) {
   bad.count = 3;
   bad.weight_stride = INT64_MIN / 2;
   wrong += refused(catalyst, rank, "weights below address 0", "V", &bad);
-  /* All ranks refuse what one of them gets wrong. */
+  /* If one rank's arguments are wrong, all ranks refuse the call. */
   bad = good;
   if (rank == ranks - 1) bad.count = -1;
   wrong += refused(catalyst, rank, "a negative count on one rank", "V", &bad);

@@ -1,6 +1,7 @@
-// A simulation that has its own settings of the process, and looks after each call of the adaptor whether
-// they are as before: signals, floating point, locale, environment, folder, umask, limits, streams. Argument:
-// a script that changes all it can. Exit status 0 if each call succeeded and nothing had changed.
+// A simulation that has its own settings of the process, and checks after each call of the adaptor
+// that they are unchanged: signals, floating point, locale, environment, folder, umask, limits,
+// streams. Argument: a script that changes all it can. Exit status 0 if each call succeeded and
+// nothing had changed.
 #include <dirent.h>
 #include <fcntl.h>
 #include <mpi.h>

@@ -24,7 +24,7 @@ options.ExtractsOutputDirectory = os.environ["VDI_OUTPUT"]
 
 
 def in_c(name):
-    """A variable as libraries see it, whatever Python remembers."""
+    """A variable as libraries see it, whatever value Python has cached."""
     import ctypes
     getenv = ctypes.CDLL(None).getenv
     getenv.restype = ctypes.c_char_p

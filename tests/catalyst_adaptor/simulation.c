@@ -2,7 +2,7 @@
  * then the code that each step must return, or CODE*STEPS. Exit status 0 if all did and each failure had a
  * text. Environment: VDI_TEST_INITIALIZE=CODE: initialize returns that, and nothing else happens, unless
  * VDI_TEST_THEN=SCRIPT: initialize with that script succeeds and is finalized.
- * VDI_TEST_WANTS=1010: what vdi_catalyst_wants says before each step.
+ * VDI_TEST_WANTS=1010: the answers of vdi_catalyst_wants before the steps.
  * VDI_TEST_LATE=1: finalize is called after MPI_Finalize.
  * VDI_TEST_GROWTH=KIB: the resident memory grows by less from a quarter of the steps to the last.
  * VDI_ISOLATION: the same in processes of their own. */

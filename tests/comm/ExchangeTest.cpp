@@ -74,8 +74,8 @@ TEST_CASE("every rank receives every rank's data for it, round after round") {
   const Communicator world = Communicator::world();
   unsetenv("VDI_RANKS_PER_HOST");
   const int last = world.size() - 1;
-  // Only the last host has trouble: its leader has no room, or one of its ranks cannot open the leader's
-  // memory.
+  // Only the last host has a problem: its leader has no room, or one of its ranks cannot open the
+  // leader's memory.
   const int inTrouble = trouble == Trouble::NoRoom ? world.hostLeader(last) : last;
   Exchange exchange(world, transport);
   for (const int round : {0, 1, 7, 2, 3}) {

@@ -77,7 +77,7 @@ std::vector<std::uint64_t> told(const Communicator& world) {
   keep(fromEach);
   std::vector<std::uint64_t> counts(size, 1);
   keepBytes(world.allToAll(std::as_bytes(std::span(toEach)), counts, sizeof(std::uint64_t)).bytes);
-  // Only the first and the last rank exchange messages, large ones; the others go on at once.
+  // Only the first and the last rank exchange messages, which are large; the others go on at once.
   if (size > 1 && (rank == 0 || rank == size - 1)) {
     const int other = rank == 0 ? world.size() - 1 : 0;
     comm::Messages messages(world);

@@ -1,4 +1,4 @@
-// Ghost layers: the values between disjoint blocks, wherever the neighbours are.
+// Ghost layers: the values between disjoint blocks, on whichever rank the neighbours are.
 #include <algorithm>
 #include <cmath>
 #include <functional>

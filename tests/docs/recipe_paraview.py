@@ -40,8 +40,8 @@ def save_state():
 
 
 def follow():
-    """The window is looked at after the first file and after the second; what the recipe waits for happens
-    while it sleeps."""
+    """Checks the window after the first file and after the second. The files appear while the
+    recipe sleeps."""
     waits = []
 
     def sleep(seconds):

@@ -191,7 +191,7 @@ def picture_of_script():
 
 @recipe("live.py", of_scripts)
 def live():
-    """tests/stream/simulation_test.py looks at what viewers get."""
+    """tests/stream/simulation_test.py checks the frames that viewers get."""
     assert text_of("link").startswith("http://127.0.0.1:"), text_of("link")
     assert not os.path.exists("vdi-stream.link"), "the link ends with the run"
 

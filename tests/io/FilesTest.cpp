@@ -1,4 +1,4 @@
-// Reading and writing of whole files, also when something goes wrong.
+// Reading and writing of whole files, with and without failures.
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>

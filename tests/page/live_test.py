@@ -100,7 +100,7 @@ def test_frames(browser):
         browser.value("document.getElementById('pause').click()")
         wait_for_frame(browser, 3)
 
-        # The server dies in the middle of things, and comes back with one frame more.
+        # The server is killed, and comes back with one more frame.
         before = shown(browser)
         server.end(signal.SIGKILL)
         browser.wait("vdiPage.live.live.state === 'lost'", SECONDS)
@@ -192,7 +192,8 @@ def check_requests(browser, server, scheme):
 
 
 def test_pages(browser):
-    """Several pages at once get the same frames, and a page that closes meanwhile disturbs none."""
+    """Several pages at once get the same frames, and a page that closes meanwhile doesn't disturb
+    the others."""
     os.mkdir("shared")
     make("shared/step_0.vdi", 6, large=False)
     first = browser.session
@@ -236,7 +237,7 @@ def test_series(browser):
 
 
 def test_missing_frame(browser):
-    """A series plays on without a frame whose file is deleted before anybody asks for it."""
+    """A series plays on without a frame whose file is deleted before any page requests it."""
     for i in range(3):
         make(f"gap_{i}.vdi", 20 + i, large=False)
     with Server("gap_0.vdi", "gap_1.vdi", "gap_2.vdi") as server:

@@ -22,7 +22,7 @@ const random = (/** @type {number} */ below) => {
   return Math.floor(state / 0x100000000 * below);
 };
 
-/** @returns {any} what a function gives, or "refused" for a StreamError of one line */
+/** @returns {any} a function's result, or "refused" for a StreamError of one line */
 function outcome(/** @type {() => any} */ act) {
   try {
     return act();
@@ -111,7 +111,7 @@ function testTexts() {
     check(outcome(() => extendedSeries(first, {type: "series", from, times: [2], steps: [2]})) === "refused", `a series from ${from} on`);
 }
 
-/** Levels in parts of any sizes come out as they were; whatever else comes is refused, and memory stays bounded. */
+/** Levels in parts of any size come out unchanged. All else is refused, and memory is bounded. */
 function testParts() {
   for (let round = 0; round < 300; ++round) {
     const bytes = 1 + random(round < 20 ? 3 << 20 : 5000);
@@ -167,7 +167,7 @@ class FakeSocket {
 }
 
 const soon = (milliseconds = 0) => new Promise((resolve) => setTimeout(resolve, milliseconds));
-/** Waits until the decoder has nothing left, however slow the machine is. */
+/** Waits until the decoder has no work left, however slow the machine is. */
 const settled = async (/** @type {Live} */ live) => {
   await soon(20);
   while (live.isDecoding) await soon(5);
@@ -518,7 +518,7 @@ function panelOf() {
   return {panel, live: panel.live, sockets};
 }
 
-/** The line and the light of a run that lives, ends in order, and is followed by another one. */
+/** The line and the light of a run that is live, ends as it should, and is followed by another. */
 async function testEndedRun() {
   const {panel, live, sockets} = panelOf();
   sockets[0].open();
@@ -573,7 +573,7 @@ async function testLostSource() {
   live.close();
 }
 
-/** A request for a frame of a series ends, whatever becomes of the frame. */
+/** A request for a frame of a series ends, whatever happens to the frame. */
 async function testMissingFrames() {
   const {panel, live, sockets} = panelOf();
   sockets[0].open();

@@ -432,7 +432,7 @@ def page_time(browser, sheared):
 
 
 def test_frame_time(browser):
-    """CPU time, which depends less than time on the clock on what else the machine does."""
+    """CPU time, which depends less than wall-clock time on other work of the machine."""
     browser.size(640, 360)
     for field in ("mixing", "coil"):
         vdi("generate", "--field", field, "--size", "48x48x48", "--resolution", "640x360", "--supersegments", "12",
@@ -459,7 +459,7 @@ def test_frame_time(browser):
 
 
 def test_looks(browser):
-    """Nothing is cut off, on screens of all kinds; the pictures are for people to look at."""
+    """Nothing is cut off, on screens of all kinds. The pictures are for people to inspect."""
     phone, desktop = (360, 640), (1000, 640)
     for name, size, scheme in (("phone", phone, "light"), ("desktop", desktop, "light"), ("desktop", desktop, "dark")):
         browser.send("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
@@ -503,7 +503,7 @@ def test_first_look(browser):
 
 
 def test_network(browser):
-    """The page asks for nothing but itself, and allows nothing else."""
+    """The page requests nothing but itself, and its policy allows nothing else."""
     asked = {event["params"]["request"]["url"] for event in browser.events
              if event.get("method") == "Network.requestWillBeSent"}
     beyond = [url for url in asked if not url.startswith(("file://", "blob:", "data:", "about:"))]

@@ -1,5 +1,6 @@
-"""Eight pages in Chromium, connected to a running simulation: one drives, the others see who does and what changes.
-A finger turns one view meanwhile. The driver leaves, another viewer takes over and ends the run.
+"""Eight pages in Chromium, connected to a running simulation: one drives, and the others see the
+driver and the changes. A finger turns one view meanwhile. The driver leaves, another viewer takes
+over and ends the run.
 
 Further argument: the command of a simulation that takes the text of a run, tests/stream/steered.c."""
 import json

@@ -423,7 +423,7 @@ function testRangeUpwards() {
   check(asked() === "[]" && byId("low").value === "5", `an emptied field: ${byId("low").value}`);
 }
 
-/** A page whose viewer shows what it is given, and which shows no words but its message. */
+/** A page whose viewer shows each VDI that it gets, and whose only text is its message. */
 function pageOf() {
   const {byId} = fields();
   Object.assign(globalThis, {location: {hash: ""}});

@@ -38,7 +38,7 @@ TEST_CASE("blending: several ranks with scattered blocks") {
       REQUIRE(test::mostOpaque(*expected) > 0.5F);
       const test::Off off = test::offBetween(*together, *expected);
       CHECK(off.mean < 0.1);
-      // A ray that just touches a surface crosses it or doesn't, as rounding has it.
+      // Rounding decides whether a ray that just touches a surface crosses it.
       CHECK(off.pixels <= (blending.mode == BlendMode::Isosurface ? 0.002 : 0.0));
     }
   }

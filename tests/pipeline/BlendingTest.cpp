@@ -61,7 +61,8 @@ void checkAgainstReference(VdiGenerator& generator, const Case& c) {
     const Image expected = reference::renderVolume(inputs, blocks);
     const auto image = generator.renderVolume(camera, function, settings);
     const test::Off off = test::offBetween(*image, expected);
-    // A ray that just touches a surface crosses it or doesn't. The filters of GPUs have 8 bits.
+    // Rounding decides whether a ray that just touches a surface crosses it. The filters of GPUs
+    // have 8 bits.
     const double touching = test::device()->isCpu() ? 0.005 : 0.015;
     CHECK(off.pixels <= (blending.mode == BlendMode::Isosurface ? touching : 0.0));
     CHECK(off.mean < 0.3);
@@ -130,7 +131,7 @@ TEST_CASE("blending: extremes and isosurfaces in double precision") {
         for (const Image& seen :
              {*generator.renderVolume(camera, function, settings), reference::renderVolume(inputs, blocks)}) {
           const test::Off off = test::offBetween(seen, expected);
-          // Surfaces have edges, and a pixel at an edge is all wrong or right.
+          // Surfaces have edges, and a pixel at an edge is either right or completely wrong.
           const bool edges = blending.mode == BlendMode::Isosurface;
           CHECK(off.mean <= (edges ? 0.5 : 0.2));
           CHECK(off.pixels <= (edges ? 0.01 : 0.0));

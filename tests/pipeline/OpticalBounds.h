@@ -25,9 +25,9 @@ struct Bound {
 
 /// Bounds for pictures, in 1/255. At eight samples per voxel, the scalar is nearly linear within a sample:
 /// the measured difference is 0.3 at most and 0.04 on average. At one sample per voxel it is not, since
-/// trilinear cells are cubic along a ray: 3.7 and 0.5. Steep functions make edges, and a pixel at the edge of
-/// an opaque object is all wrong or right: 0.7 and 8 % of the pixels. automaticRate is one sample per voxel
-/// or more. GPUs filter textures with 8-bit weights.
+/// trilinear cells are cubic along a ray: 3.7 and 0.5. Steep functions make edges, and a pixel at
+/// the edge of an opaque object is either right or completely wrong: 0.7 and 8 % of the pixels.
+/// automaticRate is one sample per voxel or more. GPUs filter textures with 8-bit weights.
 inline Bound boundOf(const gpu::Device& device, double rate, bool steep) {
   const double coarse = device.isCpu() ? 1.0 : 3.0;
   if (rate > 1.0)

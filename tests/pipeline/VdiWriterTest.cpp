@@ -1,4 +1,5 @@
-// All ranks write one file, which equals the file of one rank however the lists are dealt, or no file at all.
+// All ranks write one file, or none at all. It equals the file of one rank, however the lists are
+// distributed.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -94,7 +95,7 @@ ListsOf<Segment> cut(const ListsOf<Segment>& lists, const Range& range) {
   return part;
 }
 
-/// Collective: all ranks know the VDI, and each adds the lists that it was dealt.
+/// Collective: all ranks know the VDI, and each adds the lists that were assigned to it.
 WrittenVdi writeDealt(const fs::path& path, const Vdi& vdi, const Deal& deal,
                       WrittenBy writtenBy = WrittenBy::Owner) {
   return std::visit(

@@ -53,7 +53,7 @@ def shown(positions, weights, lengths, density):
 
 
 def end_in_a_child(catalyst):
-    """A forked child leaves the run alone, whatever it calls."""
+    """A forked child doesn't affect the run, whatever it calls."""
     child = os.fork()
     if child == 0:
         code = 1
@@ -135,7 +135,7 @@ assert vdi.metadata["array"]["name"] == "V", vdi.metadata
 assert len(vdi.segments) > 1000
 received = [os.path.join("received", name) for name in os.listdir("received")]
 assert open(received[0], "rb").read() == open("v_020.vdi", "rb").read(), "what's received isn't what's written"
-# Another one may follow in the process.
+# Another run may follow in the same process.
 with Catalyst(MPI.COMM_WORLD, json={"field": "V"}) as catalyst:
     catalyst.set_blocks([])
     assert catalyst.wants(1)

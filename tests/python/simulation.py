@@ -1,4 +1,5 @@
-"""A simulation in Python: 8 blocks of a field dealt to the ranks, handed over by pv_vdi.catalyst. Argument: the script."""
+"""A simulation in Python: 8 blocks of a field, distributed over the ranks and handed over by
+pv_vdi.catalyst. Argument: the script."""
 
 import os
 import shutil

@@ -1,7 +1,7 @@
 // Damaged, reordered and invented messages, in both directions: texts, conversations, and bytes on a real
 // connection. Each must be refused with Error{Format}, or the connection closed; nothing else may happen.
-// Each case has the same data in every run, for two seconds; with VDI_FUZZ_SECONDS=600 it goes on with others
-// for that time. Meant to run under sanitizers.
+// Each case has the same data in every run, for two seconds. With VDI_FUZZ_SECONDS=600 it goes on
+// with other data for that time. The test is meant to run under sanitizers.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -195,7 +195,7 @@ struct Message {
   std::string bytes;
 };
 
-/// All that a server says to a viewer to whom it sends a few frames.
+/// All messages from a server to a viewer to which it sends a few frames.
 std::vector<Message> conversation() {
   Hub::Options options;
   options.token = token;

@@ -21,7 +21,7 @@ constexpr std::size_t fullBytes = 20 * mebibyte;
 const std::string token(32, 't');
 const Clock::time_point start = Clock::time_point(1000s);
 
-/// Counts the bytes of the levels that somebody still has.
+/// Counts the bytes of the levels that are still referenced.
 class Levels {
  public:
   FramePtr frame(std::uint32_t id) {

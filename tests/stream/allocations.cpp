@@ -1,6 +1,6 @@
-// A server whose process runs out of memory. In each round, one allocation of the server's or the publisher's
-// threads fails, or all do for a while, while a viewer connects and a frame is published. No thread ends the
-// process, and the next viewer gets the next frame at once.
+// A server whose process runs out of memory. In each round, a viewer connects and a frame is
+// published. Meanwhile, one allocation of the server's or the publisher's threads fails, or all do
+// for a while. No thread ends the process, and the next viewer gets the next frame at once.
 //
 // stream_allocations [growth]: after allocation n, allocation growth * n + 1 fails; 1.0 tries all.
 #include <sys/resource.h>

@@ -122,7 +122,7 @@ def at_once(server):
 
 
 def slowly(server):
-    """More connections than the server has, each of which sends a byte now and then."""
+    """More connections than the server takes, each of which sends a byte now and then."""
     before = standing(server)
     seen = Viewer(server.port, PATIENCE)
     seen.hello(server.token)
@@ -189,7 +189,7 @@ def frames(server, files, live, name, kept):
             os.remove(live / name(number - kept))
     after = standing(server)
     print("%d frames: %.1f MiB, %d threads, %d files before; %.1f, %d, %d after" % (frame_count, *before, *after))
-    # A series needs a time and a step of each frame, and twice that while it grows.
+    # A series stores the time and the step of each frame, and takes twice that while it grows.
     check(after[0] - before[0] < 1 + 64 * frame_count / (1 << 20), "frames leave no memory behind but the series'")
     check(after[1:] == before[1:], "frames leave no threads and no files behind")
     for announced, got in stalled.levels():

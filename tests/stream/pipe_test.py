@@ -104,7 +104,8 @@ class PipeTest(ServedFolder):
         self.appear("small2", "c.vdi")
         announced, data = next(levels)
         self.assertEqual((announced["frame"], data), (2, self.bytes_of("small2")))
-        # Frames that nobody keeps any more are fetched again; one that is gone has a cause.
+        # The relay fetches frames again that it no longer keeps, and gives a cause for one that is
+        # gone.
         for name in "defg":
             self.appear("small1", name + ".vdi")
             next(levels)

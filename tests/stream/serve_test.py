@@ -188,7 +188,7 @@ class ServeTest(ServedFolder):
             self.assertEqual(done.returncode, 0, done.stderr)
             given.end()
             self.assertNotIn(secret, given.said())
-        # Only a file that others can read is worth a line.
+        # Only a file that others can read gets a line.
         for mode, lines in ((0o600, 0), (0o640, 1), (0o604, 1)):
             file.chmod(mode)
             given = self.serve(self.made / "small0.vdi", "--token-file", file)
@@ -420,7 +420,7 @@ class ServeTest(ServedFolder):
             again.send(type="state", state="waiting", viewers=1)
             again.send(type="series", times=[0], steps=[0], **{"from": 0})
             again.socket.settimeout(0.5)
-            with self.assertRaises(socket.timeout):  # nobody asks for what isn't listed
+            with self.assertRaises(socket.timeout):  # no client requests an unlisted frame
                 self.assertIsNone(again.message())
             again.socket.settimeout(PATIENCE)
             again.send(type="series", times=[1, 2], steps=[1, 2], **{"from": 1})
@@ -460,7 +460,8 @@ class ServeTest(ServedFolder):
             self.assertEqual(viewer.message()["type"], "welcome")
         viewers[2].hello(server.token)
         self.assertEqual(viewers[2].end(), 4503)
-        # Many that say nothing, or little by little: beyond the limit they are closed at once.
+        # Many connections that send nothing, or one byte at a time: beyond the limit they are
+        # closed at once.
         quiet = []
         for _ in range(300):
             connection = socket.create_connection(("127.0.0.1", server.port), PATIENCE)

@@ -150,7 +150,7 @@ def in_files(folder, at, paused_at):
 
 
 def told(folder, driver, paused_at, camera):
-    """Checks the values that each rank was given, and when."""
+    """Checks which values each rank was given, and when."""
     parameters = [lines(folder / ("parameters_%d.txt" % rank)) for rank in range(RANKS)]
     check(all(one == parameters[0] for one in parameters), "all ranks have the same parameters at the same steps")
     log = [json.loads(line) for line in lines(folder / "vdi-steering.jsonl")]

@@ -58,7 +58,7 @@ class Server:
         return reply, body
 
     def ticks(self):
-        """The processor's time that the server has taken."""
+        """The CPU time that the server has taken."""
         fields = pathlib.Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
         return int(fields[11]) + int(fields[12])
 

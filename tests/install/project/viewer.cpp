@@ -1,5 +1,6 @@
-// A program in C++ on the library without VTK: makes a VDI of a small volume, writes and reads it, and looks
-// at it from another viewpoint. Its argument is the file. The adaptor's header is for C++ too.
+// A program in C++ on the library without VTK: makes a VDI of a small volume, writes and reads it,
+// and renders it from another viewpoint. Its argument is the file. The adaptor's header is for C++
+// too.
 #include <vdi/io/VdiFile.h>
 #include <vdi/pipeline/VdiGenerator.h>
 #include <vdi/pipeline/VdiRenderer.h>
