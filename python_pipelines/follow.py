@@ -18,7 +18,7 @@ while not window.GetDone():
     files = sorted(glob.glob(os.path.join(sys.argv[1], "*.vdi")))
     if files and files[-1] != newest:
         newest = files[-1]
-        if reader is None:  # the first one: look from where it was made
+        if reader is None:  # the first VDI: look from its own viewpoint
             reader = VDIReader(FileNames=[newest])
             Show(reader, view)
             viewpoint = [reader.SMProxy.GetProperty("Viewpoint").GetElement(i) for i in range(9)]

@@ -1,5 +1,5 @@
 """The shortest Catalyst script. It writes a Volumetric Depth Image of the array V at each step, to
-files vdi_000100.vdi and so on. A file has the step's number and time inside.
+files vdi_000100.vdi and so on. Each file contains the step's number and time.
 
 The adaptor has loaded the plugin already. Copy this file and change array, range, camera and
 colours."""

@@ -1,5 +1,6 @@
-"""Saves a Catalyst script of a sample of the simulation's data, as ParaView's window does by *File,
-Save Catalyst State*. Usage: pvbatch save_state.py SAMPLE STATE, say sample.vti and state.py."""
+"""Saves a Catalyst script for a sample of the simulation's data, as ParaView's window does by
+*File, Save Catalyst State*. Usage: pvbatch save_state.py SAMPLE STATE, such as sample.vti and
+state.py."""
 
 import sys
 

@@ -1,5 +1,5 @@
 """A Catalyst script for simulations that hand unstructured grids to ParaView's Catalyst by an
-adaptor of their own. Resample To Image makes a lattice of the grid, and a VDI is made of that."""
+adaptor of their own. Resample To Image turns the grid into a lattice, of which a VDI is made."""
 
 from paraview import catalyst
 from paraview.simple import *  # noqa: F403

@@ -1,7 +1,8 @@
 """The recipes of docs/recipes.md: each has the text of a file in python_pipelines/, which runs.
 
 Several recipes share a run. The tests run the recipes with fewer pixels. The environment has PVBATCH,
-PVPYTHON, MPIEXEC, SCREEN (what runs a command with a display), PV_PLUGIN_CONFIG_FILE and PYTHONPATH.
+PVPYTHON, MPIEXEC, SCREEN (a command that runs another one with a display), PV_PLUGIN_CONFIG_FILE
+and PYTHONPATH.
 """
 
 import atexit
