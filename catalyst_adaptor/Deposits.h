@@ -1,4 +1,4 @@
-// The arrays of cells that the engines make of the particles that a simulation hands over.
+// The cell arrays that the engines make from a simulation's particles.
 #pragma once
 
 #include <cstddef>

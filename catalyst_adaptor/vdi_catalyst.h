@@ -21,7 +21,7 @@
  * files are missing. After an error, the next step works again, with the blocks and arrays from before.
  * Values are used where they are: pointers must stay valid, and their data unchanged, until
  * vdi_catalyst_execute returns. The host holds copies of only the layers beside blocks, and of whole blocks
- * if the blocks' scalar types differ. Arrays made of particles take 4 bytes a cell.
+ * if the blocks' scalar types differ. Arrays made of particles take 4 bytes per cell.
  *
  * Scripts are Catalyst scripts of version 2 (paraview.catalyst). They find the blocks, a
  * vtkPartitionedDataSet with one vtkImageData per block, under the name "grid":
@@ -158,8 +158,8 @@ VDI_CATALYST_API int vdi_catalyst_initialize_pipelines(int32_t fortran_communica
 VDI_CATALYST_API int vdi_catalyst_initialize_json(int32_t fortran_communicator, const char* json,
                                                   vdi_catalyst** catalyst);
 
-/* Sets this rank's blocks, possibly none, and forgets all arrays. Blocks with ghost layers take a byte a
- * cell. */
+/* Sets this rank's blocks, possibly none, and forgets all arrays. Blocks with ghost layers take a
+ * byte per cell. */
 VDI_CATALYST_API int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count,
                                              const vdi_catalyst_block* blocks);
 
@@ -245,9 +245,9 @@ typedef struct vdi_catalyst_particles {
  *   applies: at that length both spread equally wide, and a shorter kernel could miss all centres.
  *
  * No weight is lost: the shares of each particle are divided by their sum over all cells that blocks own.
- * Near a face of the domain, the weight that would lie beyond it thus goes to the cells on this
- * side. Ghost cells get the values of their owners. Cells that finer blocks hide get the mean of
- * the cells that hide them. The result is the same for any distribution of blocks and particles
+ * Near a face of the domain, the weight that would lie beyond it therefore goes to the cells on
+ * this side. Ghost cells get the values of their owners. Cells that finer blocks hide get the mean
+ * of the cells that hide them. The result is the same for any distribution of blocks and particles
  * over ranks, to within rounding to f32.
  *
  * Particles outside all blocks (blocks own their lower faces, not their upper ones), and those whose position

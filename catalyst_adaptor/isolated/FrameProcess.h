@@ -19,9 +19,10 @@
 
 namespace vdi::catalyst {
 
-/// No function is collective, and each waits for the given time at most. Ranks learn of finished frames at
-/// different moments; IsolatedRun makes them agree. So functions that talk with the process don't throw: if
-/// there is no memory for its messages, they give the process up.
+/// No function is collective, and each waits for the given time at most. Ranks learn of finished
+/// frames at different moments; IsolatedRun makes them agree. Functions that communicate with the
+/// process therefore don't throw: if there is no memory for its messages, they count the process as
+/// gone.
 class FrameProcess {
  public:
   using Milliseconds = std::chrono::milliseconds;

@@ -27,8 +27,8 @@ class LiveStream {
   /// The number of frames that viewers never got, because the next one came before they were encoded.
   std::uint64_t dropped() const;
 
-  /// The viewers' request since the last call. Waits at most `patience`. Nullopt if there is none, or the run
-  /// lets nobody steer.
+  /// The viewers' request since the last call. Waits at most `patience`. Nullopt if there is none,
+  /// or if the run doesn't let viewers steer.
   std::optional<stream::SteeringRequest> takeRequest(std::chrono::milliseconds patience);
   /// Tells viewers what they may ask for, and the values in force.
   void setControls(stream::Controls controls);

@@ -31,8 +31,8 @@ plugin_file = ""
 
 @contextlib.contextmanager
 def plugin_named():
-    """Gives scripts the plugin as os.environ["VDI_PLUGIN"]. This bypasses the mapping's methods, because these would
-    change the environment of the process, which is the simulation's."""
+    """Gives scripts the plugin as os.environ["VDI_PLUGIN"]. This bypasses the mapping's methods,
+    because they would change the environment of the process, which is the simulation's."""
     variables = os.environ._data
     name = os.environ.encodekey("VDI_PLUGIN")
     before = variables.get(name)
@@ -110,8 +110,8 @@ def what_is_wrong_with_plugin(plugin):
 
 
 def load_plugin():
-    """Loads our plugin, so that `from paraview.simple import *` has its filters: scripts that ParaView writes by itself load
-    none. Returns "" or the reason of a failure."""
+    """Loads our plugin, so that `from paraview.simple import *` has its filters: scripts that
+    ParaView writes load no plugin. Returns "" or the reason of a failure."""
     wrong = what_is_wrong_with_plugin(plugin_file)
     if wrong:
         return wrong
@@ -248,7 +248,7 @@ class Extracts:
         return [extractor for same in writers.values() for extractor in same[:1]]
 
     def tell_of_older_files(self, due):
-        """Tells, once for each extractor, that it replaces files of an earlier run."""
+        """Reports, once for each extractor, that it replaces files of an earlier run."""
         from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
         from vtkmodules.vtkCommonCore import vtkLogger
         for extractor in due:
@@ -308,7 +308,8 @@ def forget_new_proxies(before):
 
 
 def set_time_step():
-    """Gives the step to filters whose VDI a script saves by itself. Extractors give it to their own."""
+    """Gives the step to filters whose VDI a script itself saves. Extractors give it to their own
+    filters."""
     from paraview import servermanager
     from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
     for source in servermanager.ProxyManager().GetProxiesInGroup("sources").values():

@@ -66,7 +66,7 @@ int main(int argc, char** argv) {
   int ranks = 1;
   MPI_Comm_rank(MPI_COMM_WORLD, &rank);
   MPI_Comm_size(MPI_COMM_WORLD, &ranks);
-  std::vector<int> counts;  // each rank's count of numbers: 3 a star
+  std::vector<int> counts;  // each rank's count of numbers: 3 per star
   std::vector<int> starts;
   for (int i = 0; i < ranks; ++i) {
     starts.push_back(3 * (stars * i / ranks));

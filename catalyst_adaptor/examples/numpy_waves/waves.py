@@ -1,4 +1,4 @@
-"""Refraction of sound by a slow sphere: the wave equation in NumPy, on slabs of z, one a rank.
+"""Refraction of sound by a slow sphere: the wave equation in NumPy, on slabs of z, one per rank.
 
     mpirun -n 4 python3 waves.py [vdi.json]
 

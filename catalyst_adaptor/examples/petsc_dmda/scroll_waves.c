@@ -1,4 +1,4 @@
-/* Scroll waves in an excitable medium, after Barkley, on PETSc's DMDA with two unknowns a point:
+/* Scroll waves in an excitable medium, after Barkley, on PETSc's DMDA with two unknowns per point:
  *
  *     du/dt = laplacian(u) + u (1 - u) (u - (v + b) / a) / e,   dv/dt = u - v
  *
