@@ -1,12 +1,13 @@
-/* A simulation of heat, whose steps are timed: a box of N x N x N cells of doubles a rank, side by side along
- * x. Arguments: a JSON text, a script that ends in .py, or "-" for no library at all; the number of steps.
- * The first rank prints "initialize CODE MICROSECONDS", a line "step NUMBER CODE MICROSECONDS BUSY" for each
- * step, and "finalize CODE MICROSECONDS"; the time is that of the slowest rank. BUSY is 1 if the file
- * VDI_TEST_BUSY doesn't exist before the step, because its frame is still under way. Exit status 0 if all
- * ranks have the same codes. VDI_TEST_SIZE: N, 16 unless given. VDI_TEST_PAUSE: milliseconds after each step.
- * VDI_TEST_REPEAT: the number of times that the heat spreads in a step. VDI_TEST_KILL=STEP: kills
- * the last rank's worker while that step is handed over. VDI_TEST_FILE_LIMIT: the largest file, in
- * bytes, that the last rank may make during the first three steps. VDI_TEST_UNEQUAL: the first rank
+/* A simulation of heat, whose steps are timed: one box of N x N x N cells of doubles per rank, side
+ * by side along x. Arguments: a JSON text, a script that ends in .py, or "-" for no library at all;
+ * the number of steps. The first rank prints "initialize CODE MICROSECONDS", a line "step NUMBER
+ * CODE MICROSECONDS BUSY" for each step, and "finalize CODE MICROSECONDS"; the time is that of the
+ * slowest rank. BUSY is 1 if the file VDI_TEST_BUSY doesn't exist before the step, because its
+ * frame is still under way. Exit status 0 if all ranks have the same codes. VDI_TEST_SIZE: N, 16
+ * unless given. VDI_TEST_PAUSE: milliseconds after each step. VDI_TEST_REPEAT: the number of times
+ * that the heat spreads in a step. VDI_TEST_KILL=STEP: kills the last rank's worker while that step
+ * is handed over. VDI_TEST_FILE_LIMIT: the largest file, in bytes, that the last rank may make
+ * during the first three steps. VDI_TEST_UNEQUAL: the first rank
  * has a second array, "W", which the others lack. VDI_TEST_HURRY: how many times as fast the steady
  * clock runs in this process while it finalizes. */
 #define _GNU_SOURCE

@@ -93,7 +93,7 @@ int main(int argc, char** argv) {
   const long late = resident_kib();
   wrong += vdi_catalyst_finalize(catalyst) != VDI_CATALYST_OK;
   printf("rank %d: %ld KiB after a fifth of %d frames, %ld KiB after all\n", rank, early, frames, late);
-  /* A leak of a hundred bytes a frame shows in 10 000; fewer frames reveal larger ones. */
+  /* A leak of a hundred bytes per frame shows in 10 000 frames; fewer reveal larger leaks. */
   if (early > 0 && late - early > 2048) {
     fprintf(stderr, "rank %d: the memory has grown by %ld KiB\n", rank, late - early);
     ++wrong;

@@ -145,7 +145,8 @@ def test_tokens(browser):
 
 
 def test_tls(browser):
-    """A page over TLS, whose requests tell nobody the token. The browser is told to trust any certificate."""
+    """A page over TLS, whose requests don't reveal the token. The browser is told to trust any
+    certificate."""
     os.mkdir("secured")
     make("secured/step_0.vdi", 16, large=False)
     subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", "key.pem", "-out", "certificate.pem",

@@ -25,7 +25,7 @@ namespace {
 
 const Box cube{glm::dvec3(0.0), glm::dvec3(1.0)};
 
-/// All ranks' blocks and particles, and this rank's, which it gets at random.
+/// All ranks' blocks and particles, and this rank's, which are assigned at random.
 struct Shared {
   Shared(std::vector<Block> allBlocks, ParticleSet allParticles, const comm::Communicator& comm,
          std::uint32_t seed)

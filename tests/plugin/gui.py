@@ -117,7 +117,7 @@ def approach(view, image):
 
 
 def show_alone(view, image, rendered):
-    """Shows what Render VDI makes of the image, and not the image."""
+    """Shows the output of Render VDI in place of the image."""
     from paraview import simple
     image.Auto, image.Cropping, image.Resolution = 0, 0, [480, 320]
     image.CameraPosition, image.CameraFocalPoint = [45, 32, 52], [0, 0, 0]

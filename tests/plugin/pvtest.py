@@ -87,7 +87,7 @@ def vdi_in_page(page, path):
 
 
 def blocks_source(layout, count=4, cells=8, kind="float32", as_cells=False):
-    """A multiblock data set whose blocks each rank makes by itself."""
+    """A multiblock data set of which each rank makes its own blocks."""
     source = simple.ProgrammableSource()
     source.OutputDataSetType = "vtkMultiblockDataSet"
     source.Script = BLOCKS_SCRIPT.format(count=count, cells=cells, layout=layout, kind=kind, as_cells=as_cells)

@@ -1,5 +1,6 @@
-"""Relays data between a program that listens on port argv[1] of this machine and one that connects to the relay's port,
-which it prints first. Answers each line of standard input with the number of bytes relayed so far."""
+"""Relays data between a program that listens on port argv[1] of this machine and one that connects
+to the relay's port, which the relay prints first. Answers each line of standard input with the
+number of bytes relayed so far."""
 
 import socket
 import sys

@@ -58,7 +58,7 @@ with tempfile.TemporaryDirectory() as name:
         until(lambda: frames() >= 2, "frames")
         first.kill()
         first.wait(PATIENCE)
-        dead = link.stat().st_ino  # nothing could remove it
+        dead = link.stat().st_ino  # a killed run can't remove it
         time.sleep(1)
         before = frames()
         again = start(program, run)

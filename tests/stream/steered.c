@@ -1,6 +1,6 @@
-/* A simulation that viewers steer: one block of point data a rank, and three parameters, of which one ends
- * it. Each rank writes one line per step, with the values that it was given, to parameters_RANK.txt in
- * VDI_OUTPUT. Argument: the script, or the text of a run without one. */
+/* A simulation that viewers steer: one block of point data per rank, and three parameters, one of
+ * which ends it. Each rank writes one line per step, with the values that it was given, to
+ * parameters_RANK.txt in VDI_OUTPUT. Argument: the script, or the text of a run without one. */
 #include <math.h>
 #include <mpi.h>
 #include <stdio.h>
