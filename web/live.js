@@ -336,8 +336,8 @@ export class Live {
       this.heldBack = {level: arrived, load};
       return;
     }
-    // The page acknowledges a level's end when the decoder takes the level. A slow machine thus
-    // gets no more than it can show.
+    // The page acknowledges a level's end when the decoder takes the level. A slow machine
+    // therefore gets no more than it can show.
     const socket = this.socket;
     const done = () => {
       if (socket === this.socket) acknowledge(level.bytes);

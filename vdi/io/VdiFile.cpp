@@ -168,8 +168,8 @@ Header readHeader(const InputFile& file) {
   return parseHeader(file.read(0, std::min<std::uint64_t>(file.size(), sizeof(Header))), file.size());
 }
 
-/// Asks for large pages where the system has some. With small ones, page faults hold up the thread that
-/// appends the chunks of a large file.
+/// Asks for large pages where the system has some. With small ones, page faults delay the thread
+/// that appends the chunks of a large file.
 void preferLargePages(std::span<std::byte> memory) {
   const auto page = static_cast<std::uintptr_t>(::sysconf(_SC_PAGESIZE));
   void* first = memory.data();

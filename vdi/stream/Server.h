@@ -31,8 +31,9 @@ struct ServerOptions {
   /// Called when a viewer wants that frame of the series. Answer with Server::provide or
   /// Server::miss. Runs on the network's thread, so it must return at once.
   std::function<void(std::uint32_t index)> show;
-  /// Called with a wish of the viewer that drives; empty: nobody can steer. Wishes have been checked against
-  /// the controls that were set last. Runs on the network's thread, so it must return at once.
+  /// Called with a wish of the viewer that drives; empty: no viewer can steer. Wishes have been
+  /// checked against the controls that were set last. Runs on the network's thread, so it must
+  /// return at once.
   std::function<void(std::uint32_t viewer, const Wish& wish)> steer;
   /// Gets lines for the operator, without secrets, on the network's thread.
   std::function<void(const std::string& line)> log;

@@ -32,7 +32,7 @@ class Hub {
     std::uint64_t mostHeldBytes = std::uint64_t{1} << 30;
     /// Called when a viewer wants that frame of the series. Answer with provide or miss.
     std::function<void(std::uint32_t index)> show;
-    /// Called with a wish of the viewer that drives; empty: nobody can steer.
+    /// Called with a wish of the viewer that drives; empty: no viewer can steer.
     std::function<void(std::uint32_t viewer, const Wish& wish)> steer;
     /// Gets lines for the operator; may be empty.
     std::function<void(const std::string& line)> log;
