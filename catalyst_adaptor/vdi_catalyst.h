@@ -118,10 +118,11 @@ typedef struct vdi_catalyst_block {
 
 typedef struct vdi_catalyst vdi_catalyst;
 
-/* Loads ParaView, starts the engine on a duplicate of the communicator (its Fortran handle), loads our plugin
- * and adds the scripts, the same on all ranks; they are loaded at the first step. Scripts need not load the
- * plugin: those that ParaView saves work as they are. They find its path in os.environ["VDI_PLUGIN"]: the
- * value of that environment variable or, unless it is set, the plugin of this installation.
+/* Loads ParaView, starts the engine on a duplicate of the communicator (its Fortran handle), loads
+ * our plugin and adds the scripts. These are the same on all ranks, and are loaded at the first
+ * step. Scripts need not load the plugin: those that ParaView saves work as they are. They find its
+ * path in os.environ["VDI_PLUGIN"]: the value of that environment variable or, unless it is set,
+ * the plugin of this installation.
  *
  * Without scripts (count 0) it succeeds, and the first rank prints that no step will make anything.
  *
@@ -179,10 +180,10 @@ typedef struct vdi_catalyst_strides {
 } vdi_catalyst_strides;
 
 /* As vdi_catalyst_set_array, for values in another layout: interleaved with others, padded, z fastest, or
- * parts of a larger allocation. strides[i] and data[i] belong to block i. With `components` > 1, from 1 to
- * 16, the array is one of vectors, of which a run shows the magnitude, a component, or the phase of two
- * components, the real and the imaginary part. For only one component, pass its first value's address and
- * components = 1.
+ * parts of a larger allocation. strides[i] and data[i] belong to block i. `components` is from 1 to
+ * 16. With more than one, the array is one of vectors. A run shows their magnitude, a component, or
+ * the phase of two components, the real and the imaginary part. For only one component, pass its
+ * first value's address and components = 1.
  *
  * Values are read where they are, in any layout: a run without scripts never copies them on the host, nor
  * does VolumetricDepthImage in a script. If a filter of ParaView's own asks for a pointer to values
@@ -232,8 +233,9 @@ typedef struct vdi_catalyst_particles {
 /* Makes an array of cells from particles, of type VDI_CATALYST_F32. Scripts, runs without one and their
  * conditions find it under `name`, which is the same on all ranks, as they find other arrays. Each
  * vdi_catalyst_execute that needs the array makes it anew, from the particles as they are then. So pointers
- * must stay valid until that call returns, but no call is needed at each step. set_array for cells of the
- * same name replaces the particles, as these replace such an array, and vdi_catalyst_set_blocks forgets them.
+ * must stay valid until that call returns, but no call is needed at each step.
+ * vdi_catalyst_set_array for cells of the same name replaces the particles, just as particles
+ * replace such an array. vdi_catalyst_set_blocks forgets them.
  *
  * Particles may lie in blocks of any rank. The spacing of the block that owns the position, which is the
  * finest one there, decides how far a particle's weight spreads:
@@ -266,10 +268,10 @@ VDI_CATALYST_API int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const ch
  * The result is 1 in three cases: if a script isn't loaded yet, as before the first step; if a
  * script defines catalyst_execute, which runs at each step; or if the trigger of an extractor is
  * due. In a run without a script it is 1 if a frame is due by step, time or clock, whether or not
- * the data and the share of wall time will permit it, and at each step if viewers may steer. Where
- * scripts run in a process of their own, it is 1, too, while that process is at work and hasn't
- * answered yet. It is 0 for a null or finalized handle and for a step that vdi_catalyst_execute
- * refuses. */
+ * the data and the share of wall time will permit it. If viewers may steer, it is 1 at each step.
+ * Where scripts run in a process of their own, it is 1, too, while that process is at work and
+ * hasn't answered yet. It is 0 for a null or finalized handle and for a step that
+ * vdi_catalyst_execute refuses. */
 VDI_CATALYST_API int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time);
 
 /* Runs the scripts on the blocks as they are now. `step` is the same on all ranks, from 0 to INT32_MAX,
