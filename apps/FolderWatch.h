@@ -33,9 +33,9 @@ class FolderWatch {
   /// Becomes readable when this machine has changed the folder since the last call of changed(). -1
   /// if the system has no watches left (fs.inotify.max_user_instances).
   int descriptor() const { return descriptor_.number(); }
-  /// The time until changed() lists the folder although the system reports nothing: at least 250 ms,
-  /// and so much more for large folders and slow file systems that listing takes 2 % of the time, but
-  /// no more than a minute.
+  /// The time until changed() lists the folder although the system reports nothing: at least 250
+  /// ms, and no more than a minute. In between, it grows with the time that listing takes, so that
+  /// listing takes 2 % of the time.
   std::chrono::milliseconds untilListing() const;
 
   struct Changes {

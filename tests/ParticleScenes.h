@@ -85,8 +85,9 @@ inline std::vector<Block> latticeIn(const Box& box, int cells, const glm::ivec3&
   return all;
 }
 
-/// Three levels over the unit cube: eight coarse blocks of 6 cells, one of 12 cells at twice the resolution
-/// that hides some of their cells, and in it one whose faces lie within cells of the others.
+/// Three levels over the unit cube: eight coarse blocks of 6 cells; one of 12 cells at twice the
+/// resolution, which hides some of their cells; and in that one a block whose faces lie within
+/// cells of the others.
 inline std::vector<Block> levelsInCube(int ghosts = 0) {
   std::vector<Block> all;
   const double coarse = 1.0 / 12;

@@ -1,9 +1,10 @@
-/* A simulation without a script: 24 x 24 x 24 cells, a slab along x of each rank, over which the fields V, of
- * cells, z fastest, p, of 64-bit integers at points, and w, of vectors of cells, move. Arguments: a JSON text
- * or the name of a file with one (or of a script, which ends in .py), then the code that each step must
- * return. Exit status 0 if all did. VDI_TEST_BAD=1: the program first tries bad JSON texts and files, which
- * must be refused. VDI_TEST_REFUSED: the code that initialising must return; then the program ends.
- * VDI_TEST_FULL: the name of an output for which there is no room. VDI_TEST_FIRST: the first step's number.
+/* A simulation without a script: 24 x 24 x 24 cells, of which each rank has a slab along x. Three
+ * fields move over them: V, of cells, z fastest; p, of 64-bit integers at points; and w, of vectors
+ * of cells. Arguments: a JSON text or the name of a file with one (or of a script, which ends in
+ * .py), then the code that each step must return. Exit status 0 if all did. VDI_TEST_BAD=1: the
+ * program first tries bad JSON texts and files, which must be refused. VDI_TEST_REFUSED: the code
+ * that initialising must return; then the program ends. VDI_TEST_FULL: the name of an output for
+ * which there is no room. VDI_TEST_FIRST: the first step's number.
  * VDI_TEST_WANTS: for each step whether it is wanted, such as 1010; others aren't handed over.
  * VDI_TEST_OWN_TIMES=1: each rank gives a step another time. VDI_TEST_PAUSE: milliseconds between steps.
  * VDI_TEST_ALARM=1: SIGALRM interrupts each rank every millisecond, and its handler restarts no call.

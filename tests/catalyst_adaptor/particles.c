@@ -1,10 +1,10 @@
-/* A simulation of particles: a hump of them moves through the unit cube, whose 2 x 2 x 2 blocks of
- * 8 cells per axis are assigned to the ranks in one way and the particles in another. The last of
- * several ranks has no particles. Arguments: a JSON text or file (or a script, which ends in .py),
- * then the code that each step must return. The array's name is V. Exit status 0 if all calls
- * return what they should. VDI_TEST_FAULTS=1: there are also particles that can't be deposited.
- * VDI_TEST_LENGTHS=1: half of the particles have smoothing lengths of two cells, and the array's
- * values lie off the middles of cells. */
+/* A simulation of particles: a hump of them moves through the unit cube. The cube has 2 x 2 x 2
+ * blocks of 8 cells per axis. Blocks are assigned to the ranks in one way and particles in another.
+ * The last of several ranks has no particles. Arguments: a JSON text or file (or a script, which
+ * ends in .py), then the code that each step must return. The array's name is V. Exit status 0 if
+ * all calls return what they should. VDI_TEST_FAULTS=1: there are also particles that can't be
+ * deposited. VDI_TEST_LENGTHS=1: half of the particles have smoothing lengths of two cells, and the
+ * array's values lie off the middles of cells. */
 #include <math.h>
 #include <mpi.h>
 #include <stdlib.h>

@@ -1,5 +1,6 @@
-"""Compares the arrays of strided.c with one that has the same values in order, writes to the one that is used in place,
-and makes VDIs of some, which are equal, without copies of their values."""
+"""Compares the arrays of strided.c with one that has the same values in order, and writes to the
+one that is used in place. Makes VDIs of some arrays, which are equal, without copies of their
+values."""
 
 import os
 

@@ -1,5 +1,5 @@
 """pvpython as the client of a pvserver on two ranks: a VDI that is made or read there is drawn here, and orbiting it sends
-nothing. relay.py counts what goes over the socket."""
+nothing. relay.py counts the bytes that go over the socket."""
 
 import os
 import subprocess

@@ -1,6 +1,6 @@
-"""Runs inside the real ParaView (--script, which sets no __file__): uses the plugin as a person would, looks at what the
-window does by itself then, and leaves the file gui.done with "ok" or what went wrong. tests/plugin/gui.sh takes the picture
-of the window and ends the program."""
+"""Runs inside the real ParaView (--script, which sets no __file__): uses the plugin as a person
+would, checks the window's own reactions, and leaves the file gui.done with "ok" or the faults.
+tests/plugin/gui.sh takes the picture of the window and ends the program."""
 
 import os
 import sys

@@ -1,6 +1,7 @@
-"""Runs inside the real ParaView (--script, which sets no __file__): loads the plugin, prepares the view, and from
-then on notes what the view shows after each drag of the mouse: view.png, and camera.json with the camera; and calls what it's
-asked to in between (orbit_inside.py). What is done with the window is in orbit.py."""
+"""Runs inside the real ParaView (--script, which sets no __file__): loads the plugin and prepares
+the view. From then on it notes what the view shows after each drag of the mouse: view.png, and
+camera.json with the camera. In between it runs the requested calls (orbit_inside.py). orbit.py
+drives the window."""
 
 import json
 import os

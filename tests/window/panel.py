@@ -1,6 +1,6 @@
-"""By mouse, as the guide says it: from a shown volume to a VDI in two clicks, its opacity edited, an edit cancelled, Auto and
-its undo, saved as data and as a state, the trace replayed and the state loaded. Leaves a screenshot of each step in
-VDI_TEST_OUTPUT."""
+"""By mouse, as the guide describes it: from a shown volume to a VDI in two clicks, its opacity
+edited, an edit cancelled, Auto and its undo, saved as data and as a state, the trace replayed and
+the state loaded. Leaves a screenshot of each step in VDI_TEST_OUTPUT."""
 
 import functools
 import os
