@@ -119,6 +119,17 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   vtkSMVDIGeneratorProxy(const vtkSMVDIGeneratorProxy&) = delete;
   void operator=(const vtkSMVDIGeneratorProxy&) = delete;
 
+  /// Sets a flag for the lifetime of this object.
+  class Raised {
+   public:
+    explicit Raised(bool& flag) : Flag(flag) { this->Flag = true; }
+    ~Raised() { this->Flag = false; }
+    Raised(const Raised&) = delete;
+    Raised& operator=(const Raised&) = delete;
+
+   private:
+    bool& Flag;
+  };
   /// The data that a map is chosen for.
   struct Subject {
     vtkSMProxy* Input = nullptr;  // compared, never followed
@@ -129,6 +140,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
     bool operator==(const Subject&) const = default;
   };
 
+  /// The ranks if each has a client of its own (pvbatch --symmetric, Catalyst), which knows its own data
+  /// only; null otherwise.
+  static vtkMultiProcessController* RanksWithClients();
   /// Collective if each rank has a client.
   void TakeWhatIsNotSet(std::optional<double> time);
   /// Collective, called where each rank has a client. Returns whether all have the same array and component.
