@@ -76,6 +76,13 @@ vectors.SelectInputScalars = ["POINTS", "force"]
 check(not errors_of(vectors) and range_of(vectors.LookupTable) == [0, 5] and vectors.Component == 2,
       "rank %d: another array's component has its range %s" % (rank, range_of(vectors.LookupTable)))
 
+# A component that the map names, on all ranks at once.
+vectors.LookupTable.VectorComponent = 0
+check(not errors_of(vectors) and range_of(vectors.LookupTable) == [0, 1] and vectors.Component == 0,
+      "rank %d: Component follows the map: %d, %s" % (rank, vectors.Component, range_of(vectors.LookupTable)))
+vectors.Component = 2
+check(not errors_of(vectors) and range_of(vectors.LookupTable) == [0, 5], "rank %d: the map follows Component" % rank)
+
 # A component that only one rank's script sets is an error, and no rank waits for those that set
 # none.
 if rank == 0:

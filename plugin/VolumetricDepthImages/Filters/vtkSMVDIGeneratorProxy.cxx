@@ -150,7 +150,10 @@ void vtkSMVDIGeneratorProxy::TakeWhatIsNotSet(std::optional<double> time) {
     this->WatchViews();
     if (!this->MeetRanks(ranks, time)) return;
     if (this->Taken) this->FollowArray();
-    if (std::exchange(this->FollowsMap, false)) this->FollowMap();
+    if (std::exchange(this->FollowsMap, false) && this->TakeNamedComponent()) {
+      if (!this->GatherInput(ranks, this->CurrentSubject(), time)) return;
+      this->FitToComponent();
+    }
   }
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "what the view shows");
   this->TakeFromView();
@@ -198,6 +201,7 @@ bool vtkSMVDIGeneratorProxy::MeetRanks(vtkMultiProcessController* ranks, std::op
 
 bool vtkSMVDIGeneratorProxy::GatherInput(vtkMultiProcessController* ranks, const Subject& subject,
                                          std::optional<double> time) {
+  this->OfRanks.reset();
   std::array<double, 2> range{};
   const bool hasRange = this->RangeOfScalars(subject.Array.c_str(), subject.Association, time, range.data());
   const vdi::Box whole = pv::wholeToCrop(this->InputInformation());

@@ -175,8 +175,12 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// Observes the map that is set.
   void WatchMap();
   void MapUpdated();
-  /// Shows the component that the map names. Where each rank has a client, call it after GatherInput.
-  void FollowMap();
+  /// Sets Component to the one that the map names. Returns false if that changes nothing, or the array lacks
+  /// it. Where each rank has a client, call it after GatherInput.
+  bool TakeNamedComponent();
+  /// Fits the map to the component that has been taken, and asks for its VDI. Where each rank has a client,
+  /// call it after another GatherInput.
+  void FitToComponent();
   /// Fits the legends of the map, and the range of the output that ParaView knows, to the component that is
   /// set, ahead of the next update.
   void AnnounceComponent(vtkSMProxy* map, const double range[2]);
@@ -207,7 +211,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   vtkWeakPointer<vtkSMProxy> WatchedMap;            // the map that MapUpdated observes
   unsigned long MapObserver = 0;                    // its observer there
   int NamedComponent = -1;                          // the component that it named last
-  bool FollowsMap = false;                          // whether the ranks' next meeting calls FollowMap
+  bool FollowsMap = false;  // whether the ranks' next meeting calls TakeNamedComponent
 };
 
 #endif

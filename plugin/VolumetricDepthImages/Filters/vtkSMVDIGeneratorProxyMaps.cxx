@@ -78,24 +78,29 @@ void vtkSMVDIGeneratorProxy::MapUpdated() {
   if (std::exchange(this->NamedComponent, named) == named || this->Choosing || !this->Taken) return;
   if (RanksWithClients() != nullptr) {
     this->FollowsMap = true;  // the number of components is known once the ranks have met
-  } else {
-    this->FollowMap();
+  } else if (this->TakeNamedComponent()) {
+    this->FitToComponent();
   }
 }
 
-void vtkSMVDIGeneratorProxy::FollowMap() {
+bool vtkSMVDIGeneratorProxy::TakeNamedComponent() {
   const Subject before = this->CurrentSubject();
   const int components = this->ComponentsOf(before.Array, before.Association);
   if (components < 2 || this->NamedComponent >= components || this->NamedComponent == before.Component)
-    return;
-  const Raised choosing(this->Choosing);
+    return false;
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "the component that the map names");
   vtkSMPropertyHelper(this, "Component").Set(this->NamedComponent);
   this->Superclass::UpdateVTKObjects();
   this->Shown = this->CurrentSubject();
+  return true;
+}
+
+void vtkSMVDIGeneratorProxy::FitToComponent() {
+  const Raised choosing(this->Choosing);
+  const Subject now = this->CurrentSubject();
   double range[2];
   vtkSMProxy* map = this->WatchedMap;
-  const bool hasRange = this->RangeOfScalars(before.Array.c_str(), before.Association, std::nullopt, range);
+  const bool hasRange = this->RangeOfScalars(now.Array.c_str(), now.Association, std::nullopt, range);
   if (hasRange && pv::mayRescale(map)) {
     vtkSMProxy* opacity = pv::proxyIn(this, "ScalarOpacityFunction");
     if (opacity == nullptr) opacity = pv::proxyIn(map, "ScalarOpacityFunction");
