@@ -70,7 +70,7 @@ class Painter {
       const Camera camera = turned(start, azimuth, options_.elevation);
       const auto issue = viewpointIssue(vdi.bounds, vdi.view(), View(camera, size[0], size[1]));
       if (issue && warned_.insert(*issue).second)
-        fmt::print(stderr, "vdi: warning, at {} degrees: {}\n", azimuth, describe(*issue));
+        fmt::print(stderr, "vdi: warning: at {} degrees: {}\n", azimuth, describe(*issue));
       const std::filesystem::path path = pictureOf(options_, azimuth);
       io::writePng(path, io::toPicture(renderer_.renderBytes(camera, size[0], size[1], Alpha::Premultiplied,
                                                              reconstruction_)));

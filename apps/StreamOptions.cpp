@@ -24,7 +24,7 @@ std::string tokenOf(const std::string& file) {
   std::string token = stream::givenToken(file);
   struct stat status {};
   if (!file.empty() && ::stat(file.c_str(), &status) == 0 && (status.st_mode & others) != 0) {
-    fmt::print(stderr, "vdi: warning, other users can read the token in {}; chmod 600 keeps it secret\n",
+    fmt::print(stderr, "vdi: warning: other users can read the token in {}; chmod 600 keeps it secret\n",
                file);
   }
   return token;

@@ -204,8 +204,8 @@ refused 2 "step.*whole" "$vdi" generate --field sphere "${small[@]}" --step 1844
 refused 2 "exceeds" "$vdi" generate --raw s0.json s1.json --step 18446744073709551615 -o x.vdi
 refused 2 "finite" "$vdi" generate --field sphere "${small[@]}" --time nan -o x.vdi
 
-# Each viewpoint from which the picture isn't true gets one warning.
-warnings() { grep -c "warning.*$1" err.txt; }
+# Each viewpoint that can't show the VDI truly gets one warning.
+warnings() { grep -c "^vdi: warning: .*$1" err.txt; }
 works "no warning" "$vdi" render one.vdi -o x.png --azimuth -50 0 50
 [ ! -s err.txt ] || { fail "there is a warning of a viewpoint near V_O"; cat err.txt; }
 works "far beside" "$vdi" render one.vdi -o x.png --azimuth 90 180 --reconstruction constant
@@ -327,7 +327,7 @@ refused 2 "VDI_RANKS_PER_HOST is 'two'; it may be a whole number" "${mpirun[@]}"
 touch file
 for cache in /proc/nope "$folder/file"; do
   works "a bad VDI_CACHE" env VDI_CACHE="$cache" "$vdi" generate --field sphere "${small[@]}" -o cached.vdi
-  [ "$(grep -c "warning: VDI_CACHE is '$cache'" err.txt)" = 1 ] || fail "no warning of VDI_CACHE=$cache"
+  [ "$(grep -c "^vdi: warning: VDI_CACHE is '$cache'" err.txt)" = 1 ] || fail "no warning of VDI_CACHE=$cache"
 done
 works "a new VDI_CACHE" env VDI_CACHE="$folder/new/cache" "$vdi" generate --field sphere "${small[@]}" -o cached.vdi
 ! grep -q warning err.txt || fail "a warning of a cache's folder that can be made"

@@ -194,7 +194,7 @@ class ServeTest(ServedFolder):
             given = self.serve(self.made / "small0.vdi", "--token-file", file)
             given.end()
             self.assertEqual(given.said().count("\n"), lines, given.said())
-            self.assertEqual(given.said().count(f"other users can read the token in {file}"), lines)
+            self.assertEqual(given.said().count(f"vdi: warning: other users can read the token in {file}"), lines)
         file.write_text("short\n")
         done = subprocess.run([VDI, "serve", self.live, "--token-file", file], capture_output=True, text=True,
                               timeout=PATIENCE, check=False)
