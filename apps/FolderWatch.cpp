@@ -47,6 +47,11 @@ bool isFrame(std::string_view name) {
   return name.ends_with(".vdi") && !name.starts_with('.');
 }
 
+/// The properties of the entry's file; nullopt if it is another name of a file, or gone.
+std::optional<FileLook> frameAt(const std::filesystem::directory_entry& entry) {
+  return isAnotherName(entry) ? std::nullopt : lookAt(entry.path());
+}
+
 }  // namespace
 
 std::optional<FileLook> lookAt(const std::filesystem::path& file) {
@@ -121,19 +126,20 @@ std::chrono::milliseconds FolderWatch::untilListing() const {
   return std::max(std::chrono::ceil<milliseconds>(left), milliseconds(0));
 }
 
-/// Compares a file with its last known properties.
+bool FolderWatch::isKnown(const std::string& name, const FileLook& look) const {
+  const auto known = known_.find(name);
+  return known != known_.end() && known->second == look;
+}
+
+/// Compares a file with what is known of it.
 void FolderWatch::check(const std::string& name, Changes& changes) {
   const std::filesystem::path file = folder_ / name;
-  std::error_code error;
-  const std::optional<FileLook> look =
-      isAnotherName(std::filesystem::directory_entry(file, error)) ? std::nullopt : lookAt(file);
-  const auto known = known_.find(name);
-  if (look) {
-    if (known != known_.end() && known->second == *look) return;
+  std::error_code error;  // the entry of a file that is gone has no path
+  if (const auto look = frameAt(std::filesystem::directory_entry(file, error))) {
+    if (isKnown(name, *look)) return;
     known_[name] = *look;
     changes.files.push_back(file);
-  } else if (known != known_.end()) {
-    known_.erase(known);
+  } else if (known_.erase(name) > 0) {
     changes.gone.push_back(file);
   }
 }
@@ -148,13 +154,11 @@ void FolderWatch::list(Changes& changes) {
   std::error_code error;
   std::filesystem::directory_iterator entries(folder_, error);
   for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
-    const std::filesystem::path& file = entries->path();
-    std::string name = file.filename().string();
-    if (!isFrame(name) || isAnotherName(*entries)) continue;
-    const std::optional<FileLook> look = lookAt(file);
+    std::string name = entries->path().filename().string();
+    if (!isFrame(name)) continue;
+    const std::optional<FileLook> look = frameAt(*entries);
     if (!look) continue;  // the file may vanish between two listings
-    const auto before = known_.find(name);
-    if (before == known_.end() || before->second != *look) changes.files.push_back(file);
+    if (!isKnown(name, *look)) changes.files.push_back(*entries);
     seen.emplace_hint(seen.end(), std::move(name), *look);
   }
   const auto end = std::chrono::steady_clock::now();

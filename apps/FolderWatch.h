@@ -53,6 +53,7 @@ class FolderWatch {
   bool readReported(std::set<std::string>& names) const;
   void list(Changes& changes);
   void check(const std::string& name, Changes& changes);
+  bool isKnown(const std::string& name, const FileLook& look) const;
 
   std::filesystem::path folder_;
   Descriptor descriptor_;

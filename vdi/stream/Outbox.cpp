@@ -103,8 +103,8 @@ double Outbox::rate() const {
   return std::min(cap_, measured);
 }
 
-bool Outbox::isFastEnoughFor(std::uint64_t bytes) const {
-  return period_ == 0.0 || rate() == 0.0 || static_cast<double>(bytes) <= rate() * period_;
+bool Outbox::fits(std::uint64_t bytes, double seconds) const {
+  return period_ == 0.0 || rate() == 0.0 || static_cast<double>(bytes) <= rate() * seconds;
 }
 
 std::uint64_t Outbox::window() const {
@@ -119,8 +119,7 @@ bool Outbox::isUnderWay() const {
 
 bool Outbox::isWorthBeginning(std::uint64_t bytes, Clock::time_point now,
                               std::optional<Clock::time_point>& retry) const {
-  if (period_ == 0.0 || rate() == 0.0) return true;
-  if (after(now, static_cast<double>(bytes) / rate()) <= after(*offeredAt_, period_)) return true;
+  if (!offeredAt_ || fits(bytes, period_ - secondsBetween(*offeredAt_, now))) return true;
   const Clock::time_point silent = after(*offeredAt_, silentPeriods * period_);
   if (now >= silent) return true;
   retry = silent;

@@ -47,8 +47,8 @@ class Outbox {
   std::uint64_t dropped() const { return dropped_; }
   /// The bytes per second that the viewer takes, estimated from acknowledgements and the limit; 0: unknown.
   double rate() const;
-  /// Whether that many bytes fit between two frames, as far as the outbox knows.
-  bool isFastEnoughFor(std::uint64_t bytes) const;
+  /// Whether that many bytes fit between two frames, as far as is known.
+  bool isFastEnoughFor(std::uint64_t bytes) const { return fits(bytes, period_); }
   /// Bytes sent and not acknowledged.
   std::uint64_t underWay() const { return underWay_; }
   /// Bytes that may be under way.
@@ -76,6 +76,8 @@ class Outbox {
   bool begin(Clock::time_point now, std::optional<Clock::time_point>& retry);
   /// The level with which the frame begins for this viewer.
   std::uint32_t firstLevelFor(const Frame& frame) const;
+  /// Whether that many bytes take at most that long, as far as is known.
+  bool fits(std::uint64_t bytes, double seconds) const;
   bool isWorthBeginning(std::uint64_t bytes, Clock::time_point now,
                         std::optional<Clock::time_point>& retry) const;
   LevelPart take(Clock::time_point now);
