@@ -10,7 +10,6 @@
 #include <cstring>
 #include <limits>
 #include <numeric>
-#include <optional>
 #include <string_view>
 #include <utility>
 
@@ -337,40 +336,35 @@ void Communicator::broadcastInto(std::span<std::byte> bytes, int root) const {
 }
 
 Gathered Communicator::allGather(std::span<const std::byte> bytes, std::size_t elementBytes) const {
-  assert(elementBytes > 0 && bytes.size() % elementBytes == 0);
-  if (state_->serial()) return {{bytes.begin(), bytes.end()}, {0, bytes.size()}};
-  const std::uint64_t mine = bytes.size() / elementBytes;
-  state_->layOut(mine);
-  const Layout& layout = state_->in;
-  std::optional<ElementType> type;
-  Gathered result;
-  together([&] {
-    layout.requireFits();
-    type.emplace(elementBytes);
-    result = emptyGathered(layout, elementBytes);
-  });
-  call("MPI_Allgatherv", MPI_Allgatherv, MPI_Iallgatherv, bytes.data(), static_cast<int>(mine),
-       type->handle(), result.bytes.data(), layout.counts.data(), layout.starts.data(), type->handle(),
-       state_->comm());
-  return result;
+  return gatherTo(std::nullopt, bytes, elementBytes);
 }
 
 Gathered Communicator::gather(std::span<const std::byte> bytes, std::size_t elementBytes, int root) const {
-  assert(elementBytes > 0 && bytes.size() % elementBytes == 0);
   assert(root >= 0 && root < size());
+  return gatherTo(root, bytes, elementBytes);
+}
+
+Gathered Communicator::gatherTo(std::optional<int> root, std::span<const std::byte> bytes,
+                                std::size_t elementBytes) const {
+  assert(elementBytes > 0 && bytes.size() % elementBytes == 0);
   if (state_->serial()) return {{bytes.begin(), bytes.end()}, {0, bytes.size()}};
-  const std::uint64_t mine = bytes.size() / elementBytes;
-  state_->layOut(mine);
+  const auto mine = static_cast<int>(bytes.size() / elementBytes);
+  state_->layOut(bytes.size() / elementBytes);
   const Layout& layout = state_->in;
   std::optional<ElementType> type;
   Gathered result;
   together([&] {
     layout.requireFits();
     type.emplace(elementBytes);
-    if (rank() == root) result = emptyGathered(layout, elementBytes);
+    if (root.value_or(rank()) == rank()) result = emptyGathered(layout, elementBytes);
   });
-  call("MPI_Gatherv", MPI_Gatherv, MPI_Igatherv, bytes.data(), static_cast<int>(mine), type->handle(),
-       result.bytes.data(), layout.counts.data(), layout.starts.data(), type->handle(), root, state_->comm());
+  if (root) {
+    call("MPI_Gatherv", MPI_Gatherv, MPI_Igatherv, bytes.data(), mine, type->handle(), result.bytes.data(),
+         layout.counts.data(), layout.starts.data(), type->handle(), *root, state_->comm());
+  } else {
+    call("MPI_Allgatherv", MPI_Allgatherv, MPI_Iallgatherv, bytes.data(), mine, type->handle(),
+         result.bytes.data(), layout.counts.data(), layout.starts.data(), type->handle(), state_->comm());
+  }
   return result;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <exception>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -118,6 +119,9 @@ class Communicator {
  private:
   friend class Messages;
   struct State;
+  /// Returns every rank's bytes on the root, or on every rank if there is none.
+  Gathered gatherTo(std::optional<int> root, std::span<const std::byte> bytes,
+                    std::size_t elementBytes) const;
   /// Fills `bytes`, which has the root's size on every rank.
   void broadcastInto(std::span<std::byte> bytes, int root) const;
   [[noreturn]] void failTogether(const std::exception_ptr& mine, int firstFailing) const;
