@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <atomic>
 #include <utility>
-#include <vector>
 
 #include "vdi/gpu/DeviceCandidate.h"
-#include "vdi/gpu/DeviceChoice.h"
 #include "vdi/gpu/Instance.h"
 #include "vdi/gpu/VulkanDevice.h"
 
@@ -15,8 +13,7 @@ namespace vdi::gpu {
 namespace {
 
 DeviceCandidate choose(const Instance& instance, const DeviceRequest& request) {
-  const std::vector<DeviceCandidate> candidates = instance.candidates();
-  DeviceCandidate chosen = candidates[chooseDevice(summariesOf(candidates), request)];
+  DeviceCandidate chosen = chooseDevice(instance.candidates(), request);
   if (!request.importsHostMemory) chosen.limits.hostPointerAlignment = 0;
   DeviceLimits& limits = chosen.limits;
   limits.mostBytes = request.mostBytes;
@@ -37,7 +34,7 @@ struct Device::State {
       : instance(request.validation),
         candidate(choose(instance, request)),
         vulkan(instance, candidate, request.cacheFolder),
-        cpu(candidate.summary.type == DeviceType::Cpu),
+        cpu(candidate.type == DeviceType::Cpu),
         gpuPrograms(!cpu || request.gpuPrograms) {}
 
   Instance instance;
@@ -49,7 +46,7 @@ struct Device::State {
 };
 
 std::string Device::describeAll() {
-  return describeDevices(summariesOf(Instance(false).candidates()));
+  return describeDevices(Instance(false).candidates());
 }
 
 std::shared_ptr<Device> Device::create(const DeviceRequest& request) {
@@ -61,7 +58,7 @@ Device::Device(std::unique_ptr<State> state) : state_(std::move(state)) {}
 Device::~Device() = default;
 
 const std::string& Device::name() const {
-  return state_->candidate.summary.name;
+  return state_->candidate.name;
 }
 bool Device::isCpu() const {
   return state_->cpu;

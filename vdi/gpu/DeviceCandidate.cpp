@@ -1,11 +1,15 @@
 #include "vdi/gpu/DeviceCandidate.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>  // fmt::join
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstring>
 #include <utility>
+
+#include "vdi/core/Error.h"
 
 namespace vdi::gpu {
 
@@ -128,7 +132,7 @@ void inspectFeatures(VkPhysicalDevice device, DeviceCandidate& candidate) {
                                             0};
   VkPhysicalDeviceProperties2 properties{VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &m4, {}};
   vkGetPhysicalDeviceProperties2(device, &properties);
-  candidate.summary.driver = fmt::format("{} {}", driver.driverName, driver.driverInfo);
+  candidate.driver = fmt::format("{} {}", driver.driverName, driver.driverInfo);
   DeviceLimits& limits = candidate.limits;
   limits.maxBufferBytes = m4.maxBufferSize;
   // Some drivers report 4 GiB as the largest allocation and make larger ones. Their largest buffer, which
@@ -157,8 +161,37 @@ void inspectFeatures(VkPhysicalDevice device, DeviceCandidate& candidate) {
       {shuffles ? VK_TRUE : VK_FALSE, "subgroup shuffles"},
   }};
   for (const auto& [present, name] : requirements) {
-    if (present == VK_FALSE) candidate.summary.refusals.push_back(fmt::format("no {}", name));
+    if (present == VK_FALSE) candidate.refusals.push_back(fmt::format("no {}", name));
   }
+}
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+const char* typeName(DeviceType type) {
+  switch (type) {
+    case DeviceType::Discrete:
+      return "discrete";
+    case DeviceType::Integrated:
+      return "integrated";
+    case DeviceType::Virtual:
+      return "virtual";
+    case DeviceType::Cpu:
+      return "CPU";
+    default:
+      return "other";
+  }
+}
+
+/// A number is an index: as part of a name, "7" would select a device by its driver's version.
+bool selected(const DeviceCandidate& device, std::size_t index, const std::string& selector) {
+  if (selector.empty()) return true;
+  if (std::all_of(selector.begin(), selector.end(), [](unsigned char c) { return std::isdigit(c) != 0; })) {
+    return std::to_string(index) == selector;
+  }
+  return lower(device.name).find(lower(selector)) != std::string::npos;
 }
 
 }  // namespace
@@ -174,33 +207,56 @@ DeviceCandidate inspect(VkPhysicalDevice device) {
   limits.timestampPeriodNs = properties.limits.timestampPeriod;
   std::copy_n(properties.limits.maxComputeWorkGroupCount, 3, limits.maxGroups.begin());
 
-  DeviceSummary& summary = candidate.summary;
-  summary.name = properties.deviceName;
-  summary.type = typeOf(properties.deviceType);
-  summary.memoryBytes = limits.memoryBytes;
-  summary.driver = fmt::format("driver {:#x}", properties.driverVersion);
+  candidate.name = properties.deviceName;
+  candidate.type = typeOf(properties.deviceType);
+  candidate.driver = fmt::format("driver {:#x}", properties.driverVersion);
   if (properties.apiVersion >= VK_API_VERSION_1_3) {
     inspectFeatures(device, candidate);
   } else {
-    summary.refusals.push_back(fmt::format("Vulkan {}.{}, but 1.3 is needed",
-                                           VK_API_VERSION_MAJOR(properties.apiVersion),
-                                           VK_API_VERSION_MINOR(properties.apiVersion)));
+    candidate.refusals.push_back(fmt::format("Vulkan {}.{}, but 1.3 is needed",
+                                             VK_API_VERSION_MAJOR(properties.apiVersion),
+                                             VK_API_VERSION_MINOR(properties.apiVersion)));
   }
-  if (!findFamilies(device, candidate)) summary.refusals.emplace_back("no compute queue with timestamps");
+  if (!findFamilies(device, candidate)) candidate.refusals.emplace_back("no compute queue with timestamps");
   for (const auto& [format, name] :
        {std::pair(VK_FORMAT_R8_UNORM, "R8_UNORM"), std::pair(VK_FORMAT_R16_UNORM, "R16_UNORM"),
         std::pair(VK_FORMAT_R32_SFLOAT, "R32_SFLOAT")}) {
     if (!filtersLinearly(device, format))
-      summary.refusals.push_back(fmt::format("no linear filtering of {}", name));
+      candidate.refusals.push_back(fmt::format("no linear filtering of {}", name));
   }
   return candidate;
 }
 
-std::vector<DeviceSummary> summariesOf(std::span<const DeviceCandidate> candidates) {
-  std::vector<DeviceSummary> result;
-  result.reserve(candidates.size());
-  for (const DeviceCandidate& candidate : candidates) result.push_back(candidate.summary);
-  return result;
+std::string describeDevices(std::span<const DeviceCandidate> devices) {
+  if (devices.empty()) return "there is no Vulkan device: no driver (ICD) is installed or visible\n";
+  std::string text;
+  for (std::size_t i = 0; i < devices.size(); ++i) {
+    const DeviceCandidate& d = devices[i];
+    text += fmt::format("{}: {} ({}, {}, {} MiB): {}\n", i, d.name, typeName(d.type), d.driver,
+                        d.limits.memoryBytes >> 20,
+                        d.refusals.empty() ? "usable" : fmt::format("{}", fmt::join(d.refusals, ", ")));
+  }
+  return text;
+}
+
+const DeviceCandidate& chooseDevice(std::span<const DeviceCandidate> devices, const DeviceRequest& request) {
+  std::vector<std::size_t> best;
+  for (std::size_t i = 0; i < devices.size(); ++i) {
+    if (!devices[i].refusals.empty() || !selected(devices[i], i, request.selector)) continue;
+    if (!best.empty()) {
+      const DeviceType before = devices[best.front()].type;
+      if (devices[i].type < before) continue;
+      if (devices[i].type > before) best.clear();
+    }
+    best.push_back(i);
+  }
+  if (best.empty()) {
+    const std::string wanted =
+        request.selector.empty() ? "" : fmt::format(" that matches VDI_DEVICE='{}'", request.selector);
+    throw Error(ErrorCode::DeviceUnavailable, fmt::format("no usable Vulkan device{}; the devices are:\n{}",
+                                                          wanted, describeDevices(devices)));
+  }
+  return devices[best[static_cast<std::size_t>(std::max(request.localRank, 0)) % best.size()]];
 }
 
 }  // namespace vdi::gpu

@@ -51,7 +51,7 @@ VkDevice makeDevice(const DeviceCandidate& chosen) {
     throw Error(
         ErrorCode::DeviceUnavailable,
         fmt::format("the Vulkan device can't be opened: vkCreateDevice failed with {}", nameOf(result)),
-        chosen.summary.name);
+        chosen.name);
   }
   return device;
 }
@@ -60,7 +60,7 @@ VkDevice makeDevice(const DeviceCandidate& chosen) {
 
 VulkanDevice::VulkanDevice(const Instance& instance, const DeviceCandidate& chosen,
                            const std::string& cacheFolder)
-    : name_(chosen.summary.name),
+    : name_(chosen.name),
       device_(makeDevice(chosen)),
       cacheFile_(cacheFolder, pipelineCacheKeyOf(chosen.handle)) {
   queue(QueueKind::Compute).family = chosen.computeFamily;
