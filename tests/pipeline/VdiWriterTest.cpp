@@ -222,89 +222,116 @@ TEST_CASE("a pipe gets the bytes in their order, a device what it takes") {
   CHECK(std::string(full.what()).find("No space left") != std::string::npos);
 }
 
-TEST_CASE("if one rank fails all do, the old file stays, and the next one is written") {
-  const test::SharedFolder folder(world());
+namespace {
+
+/// A file that a failing write must leave as it is, and a VDI to replace it with.
+class Replacement {
+ public:
+  Replacement() {
+    writeDealt(path, old_, deal);
+    if (isRoot()) fs::permissions(path, fs::perms(0640));
+  }
+  void requireUnchanged() const {
+    if (!isRoot()) return;
+    CHECK(io::readVdi(path) == old_);
+    CHECK(folder.fileCount() == 1);
+  }
+  /// After failures, the VDI takes the file's place.
+  void requireReplaced() const {
+    writeDealt(path, vdi, deal);
+    if (!isRoot()) return;
+    CHECK(io::readVdi(path) == vdi);
+    CHECK(fs::status(path).permissions() == fs::perms(0640));
+    CHECK(folder.fileCount() == 1);
+  }
+
+  const test::SharedFolder folder{world()};
   const fs::path path = folder.path() / "f.vdi";
-  const int last = world().size() - 1;
-  const Vdi old = test::noisyVdi(97, 131, 5, 1);
   const Vdi vdi = test::noisyVdi(97, 131, 5, 2);
   const Deal deal = dealInBands(vdi.listCount(), world().size(), 1, 1);
-  writeDealt(path, old, deal);
-  if (isRoot()) fs::permissions(path, fs::perms(0640));
-  const auto requireUnchanged = [&] {
-    if (!isRoot()) return;
-    CHECK(io::readVdi(path) == old);
-    CHECK(folder.fileCount() == 1);
-  };
-  const auto says = [](const Error& error, const char* what) {
-    CHECK(std::string(error.what()).find(what) != std::string::npos);
-  };
 
+ private:
+  const Vdi old_ = test::noisyVdi(97, 131, 5, 1);
+};
+
+void requireText(const Error& error, const char* what) {
+  CHECK(std::string(error.what()).find(what) != std::string::npos);
+}
+
+}  // namespace
+
+TEST_CASE("if the root can't open the file, all ranks fail, and the old file stays") {
+  const Replacement file;
   for (const fs::path& bad :
-       {folder.path() / "none" / "f.vdi", folder.path(), fs::path("/proc/self/f.vdi")}) {
-    const Error error = errorEverywhere([&] { writeDealt(bad, vdi, deal); }, 0);
+       {file.folder.path() / "none" / "f.vdi", file.folder.path(), fs::path("/proc/self/f.vdi")}) {
+    const Error error = errorEverywhere([&] { writeDealt(bad, file.vdi, file.deal); }, 0);
     if (isRoot()) {
       CHECK(error.code() == ErrorCode::Io);
       CHECK(error.context() == bad.string());
     }
-    says(error, bad.c_str());
+    requireText(error, bad.c_str());
   }
   if (::geteuid() != 0) {  // root may write anywhere
-    if (isRoot()) fs::permissions(folder.path(), fs::perms(0500));
+    if (isRoot()) fs::permissions(file.folder.path(), fs::perms(0500));
     world().barrier();
-    says(errorEverywhere([&] { writeDealt(path, vdi, deal); }, 0), "Permission denied");
-    if (isRoot()) fs::permissions(folder.path(), fs::perms(0700));
+    requireText(errorEverywhere([&] { writeDealt(file.path, file.vdi, file.deal); }, 0), "Permission denied");
+    if (isRoot()) fs::permissions(file.folder.path(), fs::perms(0700));
   }
-  requireUnchanged();
+  file.requireUnchanged();
+  file.requireReplaced();
+}
 
-  // A full disk: when the root reserves space, when it writes early, and when the last rank writes.
-  for (const int where : {0, last}) {
+TEST_CASE("if a disk is full for one rank, all ranks fail, and the old file stays") {
+  const Replacement file;
+  // When the root reserves space, when it writes early, and when the last rank writes.
+  for (const int where : {0, world().size() - 1}) {
     for (const WrittenBy by : {WrittenBy::Owner, WrittenBy::Root}) {
+      const int failing = by == WrittenBy::Root ? 0 : where;
       std::optional<test::FileSizeLimit> full;
-      if (world().rank() == (by == WrittenBy::Root ? 0 : where)) full.emplace(4096);
-      const Error error =
-          errorEverywhere([&] { writeDealt(path, vdi, deal, by); }, by == WrittenBy::Root ? 0 : where);
+      if (world().rank() == failing) full.emplace(4096);
+      const Error error = errorEverywhere([&] { writeDealt(file.path, file.vdi, file.deal, by); }, failing);
       full.reset();
-      says(error, "File too large");
-      says(error, path.c_str());
-      requireUnchanged();
+      requireText(error, "File too large");
+      requireText(error, file.path.c_str());
+      file.requireUnchanged();
     }
   }
+  file.requireReplaced();
+}
 
-  // Lists that no reader would accept; a rank that gives up; lists that no rank has, or two ranks have.
+TEST_CASE("if one rank's lists are bad or it gives up, all ranks fail, and the old file stays") {
+  const Replacement file;
+  const Vdi& vdi = file.vdi;
+  const int last = world().size() - 1;
   Vdi broken = vdi;
   test::full(broken).segments.back().opacity = 2.0F;
-  Deal onLast(deal.size());
+  Deal onLast(file.deal.size());
   onLast.back() = {{0, vdi.listCount()}};
-  const Error refused = errorEverywhere([&] { writeDealt(path, broken, onLast); }, last);
-  says(refused, "opacity 2");
-  requireUnchanged();
+  const Error refused = errorEverywhere([&] { writeDealt(file.path, broken, onLast); }, last);
+  requireText(refused, "opacity 2");
+  file.requireUnchanged();
   const auto giveUp = [&] {
-    detail::VdiWriter<Supersegment> writer(world(), 0, path, vdi);
+    detail::VdiWriter<Supersegment> writer(world(), 0, file.path, vdi);
     world().together([&] {
       writer.add(0, cut(test::full(vdi), {0, 8000}));
       if (world().rank() == last) throw Error(ErrorCode::DeviceFailure, "the device is lost");
     });
   };
-  says(errorEverywhere(giveUp, last), "the device is lost");
-  requireUnchanged();
+  requireText(errorEverywhere(giveUp, last), "the device is lost");
+  file.requireUnchanged();
+  // Lists that no rank has, or two ranks have.
   for (const Range gap : {Range{0, 5}, Range{5000, 5001}, Range{8192, 12288}, Range{12706, 12707}}) {
-    Deal missing(deal.size());
+    Deal missing(file.deal.size());
     missing.front() = {{0, gap.first}};
     missing.back().push_back({gap.last, vdi.listCount()});
-    CHECK(test::errorOf([&] { writeDealt(path, vdi, missing); }).code() == ErrorCode::InvalidArgument);
-    Deal twice(deal.size());
+    Deal twice(file.deal.size());
     twice.front() = {{0, gap.last}};
     twice.back().push_back({gap.first, vdi.listCount()});
-    CHECK(test::errorOf([&] { writeDealt(path, vdi, twice); }).code() == ErrorCode::InvalidArgument);
+    for (const Deal& bad : {missing, twice})
+      CHECK(test::errorOf([&] { writeDealt(file.path, vdi, bad); }).code() == ErrorCode::InvalidArgument);
   }
-  requireUnchanged();
-
-  writeDealt(path, vdi, deal);
-  if (!isRoot()) return;
-  CHECK(io::readVdi(path) == vdi);
-  CHECK(fs::status(path).permissions() == fs::perms(0640));
-  CHECK(folder.fileCount() == 1);
+  file.requireUnchanged();
+  file.requireReplaced();
 }
 
 TEST_CASE("a reader sees a whole file while all ranks write") {
