@@ -116,6 +116,41 @@ static int refuse_bad(int rank) {
   return wrong;
 }
 
+static int give_arrays(int rank, vdi_catalyst* catalyst) {
+  const void* data[] = {cells};
+  vdi_catalyst_strides strides = {{sizeof(cells[0]), sizeof(cells[0][0]), sizeof(double)}, 0};
+  int wrong = expect(rank, "an unknown type", VDI_CATALYST_BAD_ARGUMENT,
+                     vdi_catalyst_set_array(catalyst, "V", 99, VDI_CATALYST_CELLS, data));
+  wrong += expect(
+      rank, "V", VDI_CATALYST_OK,
+      vdi_catalyst_set_array_strided(catalyst, "V", VDI_CATALYST_F64, VDI_CATALYST_CELLS, 1, data, &strides));
+  data[0] = points;
+  strides = (vdi_catalyst_strides){{sizeof(int64_t), sizeof(points[0][0]), sizeof(points[0])}, 0};
+  wrong += expect(rank, "p", VDI_CATALYST_OK,
+                  vdi_catalyst_set_array_strided(catalyst, "p", VDI_CATALYST_I64, VDI_CATALYST_POINTS, 1,
+                                                 data, &strides));
+  data[0] = vectors;
+  strides = (vdi_catalyst_strides){{sizeof(vectors[0][0][0]), sizeof(vectors[0][0]), sizeof(vectors[0])},
+                                   sizeof(float)};
+  wrong += expect(
+      rank, "w", VDI_CATALYST_OK,
+      vdi_catalyst_set_array_strided(catalyst, "w", VDI_CATALYST_F32, VDI_CATALYST_CELLS, 3, data, &strides));
+  return wrong;
+}
+
+static int refuse_steps(int rank, int ranks, vdi_catalyst* catalyst) {
+  int wrong = expect(rank, "a step before the first is wanted", 0, vdi_catalyst_wants(catalyst, -1, 0.0));
+  wrong += expect(rank, "a step before the first", VDI_CATALYST_BAD_ARGUMENT,
+                  vdi_catalyst_execute(catalyst, -1, 0.0));
+  wrong += expect(rank, "a time that is no number", VDI_CATALYST_BAD_ARGUMENT,
+                  vdi_catalyst_execute(catalyst, 0, (double)NAN));
+  wrong += expect(rank, "a time that isn't finite on one rank", VDI_CATALYST_BAD_ARGUMENT,
+                  vdi_catalyst_execute(catalyst, 0, rank == ranks - 1 ? (double)INFINITY : 0.0));
+  wrong += expect(rank, "its text", 1,
+                  strstr(vdi_catalyst_error(catalyst), "the time isn't a finite number") != NULL);
+  return wrong;
+}
+
 int main(int argc, char** argv) {
   int rank = 0;
   int ranks = 0;
@@ -147,24 +182,7 @@ int main(int argc, char** argv) {
   wrong += expect(rank, "execute before blocks", VDI_CATALYST_BAD_ARGUMENT,
                   vdi_catalyst_execute(catalyst, 0, 0.0));
   wrong += expect(rank, "set_blocks", VDI_CATALYST_OK, vdi_catalyst_set_blocks(catalyst, 1, &block));
-  const void* data[] = {cells};
-  vdi_catalyst_strides strides = {{sizeof(cells[0]), sizeof(cells[0][0]), sizeof(double)}, 0};
-  wrong += expect(rank, "an unknown type", VDI_CATALYST_BAD_ARGUMENT,
-                  vdi_catalyst_set_array(catalyst, "V", 99, VDI_CATALYST_CELLS, data));
-  wrong += expect(
-      rank, "V", VDI_CATALYST_OK,
-      vdi_catalyst_set_array_strided(catalyst, "V", VDI_CATALYST_F64, VDI_CATALYST_CELLS, 1, data, &strides));
-  data[0] = points;
-  strides = (vdi_catalyst_strides){{sizeof(int64_t), sizeof(points[0][0]), sizeof(points[0])}, 0};
-  wrong += expect(rank, "p", VDI_CATALYST_OK,
-                  vdi_catalyst_set_array_strided(catalyst, "p", VDI_CATALYST_I64, VDI_CATALYST_POINTS, 1,
-                                                 data, &strides));
-  data[0] = vectors;
-  strides = (vdi_catalyst_strides){{sizeof(vectors[0][0][0]), sizeof(vectors[0][0]), sizeof(vectors[0])},
-                                   sizeof(float)};
-  wrong += expect(
-      rank, "w", VDI_CATALYST_OK,
-      vdi_catalyst_set_array_strided(catalyst, "w", VDI_CATALYST_F32, VDI_CATALYST_CELLS, 3, data, &strides));
+  wrong += give_arrays(rank, catalyst);
   const char* wanted = getenv("VDI_TEST_WANTS");
   const char* first_step = getenv("VDI_TEST_FIRST");
   const char* pause = getenv("VDI_TEST_PAUSE");
@@ -195,15 +213,7 @@ int main(int argc, char** argv) {
     if (code != VDI_CATALYST_OK)
       wrong += expect(rank, "the error's text", 1, vdi_catalyst_error(catalyst)[0] != '\0');
   }
-  wrong += expect(rank, "a step before the first is wanted", 0, vdi_catalyst_wants(catalyst, -1, 0.0));
-  wrong += expect(rank, "a step before the first", VDI_CATALYST_BAD_ARGUMENT,
-                  vdi_catalyst_execute(catalyst, -1, 0.0));
-  wrong += expect(rank, "a time that is no number", VDI_CATALYST_BAD_ARGUMENT,
-                  vdi_catalyst_execute(catalyst, 0, (double)NAN));
-  wrong += expect(rank, "a time that isn't finite on one rank", VDI_CATALYST_BAD_ARGUMENT,
-                  vdi_catalyst_execute(catalyst, 0, rank == ranks - 1 ? (double)INFINITY : 0.0));
-  wrong += expect(rank, "its text", 1,
-                  strstr(vdi_catalyst_error(catalyst), "the time isn't a finite number") != NULL);
+  wrong += refuse_steps(rank, ranks, catalyst);
   wrong += expect_end(rank, vdi_catalyst_finalize(catalyst));
   const struct itimerval never = {{0, 0}, {0, 0}};
   setitimer(ITIMER_REAL, &never, NULL);
