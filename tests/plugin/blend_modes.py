@@ -9,9 +9,7 @@ UNIT = 7.0  # no mode but Composite depends on it
 
 
 def waves_source(name, as_cells):
-    z, y, x = np.meshgrid(*[np.arange(n) * s for n, s in zip(SHAPE, SPACING[::-1])], indexing="ij")
-    values = 125 + 125 * np.sin(0.15 * x + np.sin(0.12 * y)) * np.cos(0.11 * z + 0.05 * x) * np.cos(0.09 * y)
-    return source_of_values(values.astype(np.float32), name, SPACING, as_cells=as_cells)
+    return source_of_values(waves(SHAPE, SPACING), name, SPACING, as_cells=as_cells)
 
 
 def set_blend(representation, number, values):

@@ -9,9 +9,7 @@ SHAPE, SPACING, ORIGIN = (50, 70, 60), [1.2, 1.0, 1.5], [-10, 5, 20]
 
 
 def waves_source():
-    z, y, x = np.meshgrid(*[np.arange(n) * s for n, s in zip(SHAPE, SPACING[::-1])], indexing="ij")
-    values = 125 + 125 * np.sin(0.15 * x + np.sin(0.12 * y)) * np.cos(0.11 * z + 0.05 * x) * np.cos(0.09 * y)
-    return source_of_values(values.astype(np.float32), "field", SPACING, ORIGIN, as_cells=True)
+    return source_of_values(waves(SHAPE, SPACING), "field", SPACING, ORIGIN, as_cells=True)
 
 
 def drawn_box(view):

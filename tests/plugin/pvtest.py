@@ -113,6 +113,13 @@ def producer_of(data):
     return producer
 
 
+def waves(shape, spacing):
+    """Smooth values [z][y][x] from 0 to 250."""
+    z, y, x = np.meshgrid(*[np.arange(n) * s for n, s in zip(shape, spacing[::-1])], indexing="ij")
+    values = 125 + 125 * np.sin(0.15 * x + np.sin(0.12 * y)) * np.cos(0.11 * z + 0.05 * x) * np.cos(0.09 * y)
+    return values.astype(np.float32)
+
+
 def source_of_values(values, name, *place, **more):
     """An updated source of a lattice (image_of), and the place of the lattice's middle."""
     image = image_of(values, name, *place, **more)
