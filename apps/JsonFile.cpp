@@ -1,6 +1,7 @@
 #include "apps/JsonFile.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>  // fmt::join
 
 #include <limits>
 #include <utility>
@@ -20,12 +21,6 @@ bool isNumbers(const json& value, std::size_t count) {
     if (!item.is_number()) return false;
   }
   return true;
-}
-
-std::string joined(const std::set<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
 }
 
 }  // namespace
@@ -60,7 +55,7 @@ JsonFile::JsonFile(std::filesystem::path path, const std::set<std::string>& know
   if (!object_.is_object()) fail("not a JSON object");
   for (const auto& [key, value] : object_.items()) {
     if (!known.contains(key))
-      fail(fmt::format("unknown field '{}'; known fields are {}", key, joined(known)));
+      fail(fmt::format("unknown field '{}'; known fields are {}", key, fmt::join(known, ", ")));
   }
 }
 
@@ -111,7 +106,7 @@ glm::ivec3 JsonFile::positives(const char* name) const {
 std::string JsonFile::choice(const char* name, const std::set<std::string>& choices) const {
   std::string value = text(name);
   if (!choices.contains(value)) {
-    fail(fmt::format("'{}' must be one of {}, but is '{}'", name, joined(choices), value));
+    fail(fmt::format("'{}' must be one of {}, but is '{}'", name, fmt::join(choices, ", "), value));
   }
   return value;
 }

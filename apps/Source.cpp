@@ -1,6 +1,9 @@
 #include "apps/Source.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>  // fmt::join
 #include <CLI/CLI.hpp>
+
 #include <algorithm>
 #include <charconv>
 #include <string_view>
@@ -50,12 +53,6 @@ double topOf(ScalarType type) {
       break;
   }
   return 1.0;
-}
-
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
 }
 
 const char* const decompositionGroup = "Volume and ranks";
@@ -119,9 +116,11 @@ void addDecompositionOptions(CLI::App& command, DecompositionOptions& options) {
       ->capture_default_str()
       ->group(decompositionGroup);
   command
-      .add_option("--layout", options.layout,
-                  "assignment of blocks to ranks: " + joined(synthetic::layoutNames()) +
-                      "; with fewer blocks than ranks, some ranks hold nothing")
+      .add_option(
+          "--layout", options.layout,
+          fmt::format(
+              "assignment of blocks to ranks: {}; with fewer blocks than ranks, some ranks hold nothing",
+              fmt::join(synthetic::layoutNames(), ", ")))
       ->type_name("LAYOUT")
       ->capture_default_str()
       ->group(decompositionGroup);
