@@ -23,7 +23,7 @@ namespace vdi::apps {
 
 namespace {
 
-struct Options {
+struct GenerateOptions {
   std::vector<std::string> raws;  // sidecars of time steps; empty: a procedural field
   std::string field = "turbulence";
   DecompositionOptions decomposition;
@@ -81,7 +81,7 @@ void printOutcome(const GenerateSettings& settings, std::uint64_t supersegments,
 }
 
 /// Writes the VDI, if it is wanted, and a picture of it. The root has gathered the whole VDI for that.
-void writeVdiFiles(const Options& options, std::size_t index, const Shot& shot, Vdi& vdi) {
+void writeVdiFiles(const GenerateOptions& options, std::size_t index, const Shot& shot, Vdi& vdi) {
   vdi.coloring->array = shot.array;
   vdi.time = options.timeOf(index);
   vdi.timeStep = options.number(index);
@@ -90,7 +90,7 @@ void writeVdiFiles(const Options& options, std::size_t index, const Shot& shot, 
 }
 
 /// The other ranks wait for the root to write. If it fails, all ranks fail.
-void shoot(const Options& options, std::size_t index, const Shot& shot, VdiGenerator& generator,
+void shoot(const GenerateOptions& options, std::size_t index, const Shot& shot, VdiGenerator& generator,
            const comm::Communicator& world) {
   if (options.wantsVdi() && options.flat.empty() && !options.output.empty()) {
     const WrittenVdi written =
@@ -114,7 +114,7 @@ void shoot(const Options& options, std::size_t index, const Shot& shot, VdiGener
 }
 
 /// Checks the options before the work starts. Throws Error.
-void requireSound(const Options& options) {
+void requireSound(const GenerateOptions& options) {
   const std::size_t last = options.steps() - 1;
   if (options.number(last) < last) {
     throw Error(ErrorCode::InvalidArgument, "the number of the last time step exceeds 2^64 - 1", "--step");
@@ -134,7 +134,7 @@ void requireHeld(const Blending& blending) {
 }
 
 /// Throws Error if an output cannot be written, or would overwrite an input.
-void requireOutputsOf(const Options& options) {
+void requireOutputsOf(const GenerateOptions& options) {
   std::vector<NamedFile> inputs{{"--camera", options.view.camera.file},
                                 {"--transfer-function", options.quality.transferFunction}};
   for (const std::string& sidecar : options.raws) {
@@ -158,7 +158,7 @@ void requireOutputsOf(const Options& options) {
 /// Makes the VDIs of all readable time steps. All functions are collective.
 class Series {
  public:
-  Series(const Options& options, const comm::Communicator& world, std::shared_ptr<gpu::Device> device)
+  Series(const GenerateOptions& options, const comm::Communicator& world, std::shared_ptr<gpu::Device> device)
       : options_(options),
         world_(world),
         device_(std::move(device)),
@@ -221,7 +221,7 @@ class Series {
     return !bad;
   }
 
-  const Options& options_;
+  const GenerateOptions& options_;
   const comm::Communicator& world_;
   std::shared_ptr<gpu::Device> device_;
   VdiGenerator generator_;
@@ -229,7 +229,7 @@ class Series {
   std::future<std::vector<Block>> reading_;  // its destructor waits, so it comes last
 };
 
-void generate(const Options& options, const comm::Communicator& world) {
+void generate(const GenerateOptions& options, const comm::Communicator& world) {
   GenerateSettings settings;
   std::shared_ptr<gpu::Device> device;
   world.together([&] {
@@ -255,7 +255,7 @@ void addGenerate(CLI::App& app, Job& job) {
       "The last one writes steps_0000.vdi, steps_0001.vdi and so on, which ParaView opens as a series. All\n"
       "steps have the same viewpoint and transfer function. If these depend on the volume, the first step\n"
       "decides.");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<GenerateOptions>();
   CLI::Option* raw =
       command
           ->add_option("--raw", options->raws,
