@@ -19,7 +19,6 @@
 #include <vector>
 
 #include "catalyst_adaptor/Deposits.h"
-#include "catalyst_adaptor/json/LiveStream.h"
 #include "catalyst_adaptor/json/Measure.h"
 #include "catalyst_adaptor/json/RunSteering.h"
 #include "vdi/comm/Communicator.h"
@@ -33,8 +32,10 @@
 #include "vdi/io/Files.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
+#include "vdi/page/Page.h"
 #include "vdi/pipeline/VdiGenerator.h"
 #include "vdi/runlog/RunLog.h"
+#include "vdi/stream/LiveStream.h"
 
 namespace vdi::catalyst {
 
@@ -45,6 +46,19 @@ void makeFolderOf(const std::filesystem::path& file) {
   std::error_code error;
   if (!folder.empty()) std::filesystem::create_directories(folder, error);
   if (error) throw Error(ErrorCode::Io, "can't make the folder: " + error.message(), folder.string());
+}
+
+stream::LiveOptions liveOptionsOf(const config::RunStream& run) {
+  return {.host = run.host,
+          .port = run.port,
+          .tokenFile = run.tokenFile,
+          .linkFile = run.linkFile,
+          .certificate = run.certificate,
+          .key = run.key,
+          .megabits = run.megabits,
+          .isSteered = run.steer,
+          .page = page::emptyPage("Live"),
+          .programName = "vdi_catalyst"};
 }
 
 /// The size of a file in bytes; 0 for a device.
@@ -140,11 +154,11 @@ struct RunEngine::State {
   config::WallTimeShare wallTimeShare;
   config::HostMemoryBound hostMemory;
   std::optional<Measure> measure;
-  std::optional<double> meanNow;            // the mean that decided on this step
-  std::optional<double> meanOfLast;         // the mean at the last frame
-  std::unique_ptr<runlog::RunLog> log;      // the root's
-  std::unique_ptr<LiveStream> stream;       // the root's
-  std::unique_ptr<io::CinemaIndex> cinema;  // the root's
+  std::optional<double> meanNow;               // the mean that decided on this step
+  std::optional<double> meanOfLast;            // the mean at the last frame
+  std::unique_ptr<runlog::RunLog> log;         // the root's
+  std::unique_ptr<stream::LiveStream> stream;  // the root's
+  std::unique_ptr<io::CinemaIndex> cinema;     // the root's
   std::optional<RunSteering> steering;
   std::optional<ScalarRange> firstRange;    // the colours' range, unless the run has one
   std::optional<double> firstUnitDistance;  // the opacities', unless the run has one
@@ -175,7 +189,7 @@ void RunEngine::open(bool isIsolated) {
   state.comm.together([&] {
     if (!state.isRoot()) return;
     if (run_.cinema) state.cinema = std::make_unique<io::CinemaIndex>(run_.cinema->folder, !isAnew);
-    if (run_.stream) state.stream = std::make_unique<LiveStream>(*run_.stream);
+    if (run_.stream) state.stream = std::make_unique<stream::LiveStream>(liveOptionsOf(*run_.stream));
     // The log comes last, because a start that fails leaves no line in it, and doesn't empty it.
     if (run_.log.any()) {
       const runlog::RunStart start{run_.field, state.comm.size(), std::time(nullptr), isIsolated};
@@ -555,8 +569,10 @@ void RunEngine::save(Vdi vdi, const config::RunCamera& camera, bool isForFiles, 
     if (run_.makesPictures()) writePictures(vdi, camera, record);
     noteLatest(camera);
   }
-  if (state_->stream && &camera == run_.cameras.data())
+  if (state_->stream && &camera == run_.cameras.data()) {
     state_->stream->publish(std::make_shared<const Vdi>(std::move(vdi)));
+    state_->stream->requireSent();
+  }
   for (const std::string& file : record.files) runlog::countFile(reports.front(), file);
   reports.front().outputSeconds += std::chrono::duration<double>(Clock::now() - start).count();
   runlog::setReports(record, reports);

@@ -7,12 +7,12 @@
 #include <string>
 
 #include "catalyst_adaptor/Parameters.h"
-#include "catalyst_adaptor/json/LiveStream.h"
 #include "vdi/comm/Communicator.h"
 #include "vdi/config/ColorMap.h"
 #include "vdi/config/Run.h"
 #include "vdi/config/Schedule.h"
 #include "vdi/core/ScalarRange.h"
+#include "vdi/stream/LiveStream.h"
 #include "vdi/stream/Steering.h"
 
 namespace vdi::catalyst {
@@ -29,7 +29,7 @@ struct Steered {
 class RunSteering {
  public:
   /// `stream` is null on all ranks but the first. Both arguments must outlive this object.
-  RunSteering(const comm::Communicator& comm, LiveStream* stream) : comm_(comm), stream_(stream) {}
+  RunSteering(const comm::Communicator& comm, stream::LiveStream* stream) : comm_(comm), stream_(stream) {}
 
   /// Collective: applies the viewers' requests since the last call, and logs them with this step. While
   /// viewers pause the simulation, it waits for more. Returns whether a request changes the VDI.
@@ -44,7 +44,7 @@ class RunSteering {
   void tell(const stream::SteeringRequest& request, const std::string& log, std::int64_t step, double time);
 
   const comm::Communicator& comm_;
-  LiveStream* stream_;
+  stream::LiveStream* stream_;
   bool isPaused_ = false;
   std::exception_ptr trouble_;  // an error of the log
 };

@@ -3,7 +3,7 @@
  * @brief offers the VDI of its input to viewers over the network
  *
  * Input: the output of vtkVDIGenerator or vtkVDIReader. The rank that has the VDI starts a server
- * (vdi/stream/Server.h) at the first write, and the destructor ends it; other ranks do nothing. Writing
+ * (vdi/stream/LiveStream.h) at the first write, and the destructor ends it; other ranks do nothing. Writing
  * copies the VDI and waits for neither its encoding nor a viewer.
  */
 #ifndef vtkVDIStreamWriter_h
@@ -20,6 +20,7 @@
 #ifndef __VTK_WRAP__
 namespace vdi::stream {
 struct Controls;
+class LiveStream;
 struct SteeringRequest;
 }  // namespace vdi::stream
 #endif
@@ -90,8 +91,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
   bool Steer = false;
   char* SteeringLog = nullptr;
 
-  struct Service;
-  std::unique_ptr<Service> Running;
+  std::unique_ptr<vdi::stream::LiveStream> Running;
 };
 
 #endif
