@@ -99,4 +99,19 @@ int setParticles(FieldCalls& self, const char* name, const vdi_catalyst_particle
   return code;
 }
 
+int checkStep(FieldCalls& self, std::int64_t step, double time, FunctionRef<void()> requireOwn) {
+  const int code = guarded(
+      self, VDI_CATALYST_BAD_ARGUMENT,
+      [&] {
+        require(self.haveBlocks, "no blocks were given yet");
+        requireOwn();
+        requireTime(time);
+      },
+      step);
+  if (code != VDI_CATALYST_OK) return code;
+  return guarded(
+      self, VDI_CATALYST_BAD_ARGUMENT,
+      [&] { requireEqual(self.comm, step, "the ranks give different steps"); }, step);
+}
+
 }  // namespace vdi::catalyst

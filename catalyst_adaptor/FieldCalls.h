@@ -34,5 +34,8 @@ int setArrayStrided(FieldCalls& self, const GivenArray& array, const void* const
                     const vdi_catalyst_strides* strides);
 int setArrayOffset(FieldCalls& self, const char* name, std::int32_t association, const double* offset);
 int setParticles(FieldCalls& self, const char* name, const vdi_catalyst_particles* particles);
+/// The checks with which `execute` begins. `requireOwn` makes those of the engine; it may throw, but must not
+/// communicate.
+int checkStep(FieldCalls& self, std::int64_t step, double time, FunctionRef<void()> requireOwn);
 
 }  // namespace vdi::catalyst

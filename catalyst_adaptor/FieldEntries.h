@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "catalyst_adaptor/EngineFunctions.h"
 #include "catalyst_adaptor/FieldCalls.h"
 #include "catalyst_adaptor/Parameters.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
@@ -48,6 +49,19 @@ struct FieldEntries {
     return usable(handle) ? inForce(*handle, parametersOf(*handle), name, value, low, high) : value;
   }
   static const char* error(const Handle* handle) { return usable(handle) ? handle->error.c_str() : ""; }
+
+  /// An engine's table with these entries. All others are null.
+  static constexpr vdi_catalyst_functions table() {
+    vdi_catalyst_functions table{};
+    table.set_array = setArray;
+    table.set_array_strided = setArrayStrided;
+    table.set_array_offset = setArrayOffset;
+    table.set_particles = setParticles;
+    table.parameter_f64 = parameterF64;
+    table.parameter_i64 = parameterI64;
+    table.error = error;
+    return table;
+  }
 };
 
 }  // namespace vdi::catalyst

@@ -220,23 +220,14 @@ using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable, parametersOf>;
 
 }  // namespace
 
-const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
-    initialize,
-    initializePipelines,
-    nullptr,
-    initializeJson,
-    nullptr,
-    setBlocks,
-    Entries::setArray,
-    Entries::setArrayStrided,
-    Entries::setArrayOffset,
-    Entries::setParticles,
-    wants,
-    execute,
-    Entries::parameterF64,
-    Entries::parameterI64,
-    finalize,
-    Entries::error,
-    nullptr,
-    nullptr,
-};
+constinit const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = [] {
+  vdi_catalyst_functions table = Entries::table();
+  table.initialize = initialize;
+  table.initialize_pipelines = initializePipelines;
+  table.initialize_json = initializeJson;
+  table.set_blocks = setBlocks;
+  table.wants = wants;
+  table.execute = execute;
+  table.finalize = finalize;
+  return table;
+}();

@@ -27,7 +27,6 @@ namespace {
 using vdi::catalyst::guarded;
 using vdi::catalyst::guardedTogether;
 using vdi::catalyst::require;
-using vdi::catalyst::requireEqual;
 
 /// The live handle. Any other handle has been finalized, and must not be read.
 vdi_catalyst*& alive() {
@@ -90,9 +89,9 @@ class Reading {
 
 /// The process that makes a run's frames: the simulation's, a separate one, or the successor of a separate
 /// one.
-enum class Place { Simulation, Process, NextProcess };
+enum class FrameMaker { Simulation, Process, NextProcess };
 
-int start(vdi_catalyst& self, const char* json, Place place) {
+int start(vdi_catalyst& self, const char* json, FrameMaker maker) {
   int code = guarded(self, VDI_CATALYST_ENGINE, [&] {
     require(alive() == nullptr, "a run by JSON goes on in this process; finalize it first");
   });
@@ -103,22 +102,23 @@ int start(vdi_catalyst& self, const char* json, Place place) {
   if (code != VDI_CATALYST_OK) return code;
   std::optional<Reading> reading;
   code = guarded(self, VDI_CATALYST_ENGINE, [&] { reading.emplace(self, *comm); });
-  if (code == VDI_CATALYST_OK) code = reading->read(json, place == Place::NextProcess);
+  if (code == VDI_CATALYST_OK) code = reading->read(json, maker == FrameMaker::NextProcess);
   if (code != VDI_CATALYST_OK) return code;
   code = guarded(self, VDI_CATALYST_ENGINE, [&] {
     self.engine = std::make_unique<vdi::catalyst::RunEngine>(
         MPI_Comm_c2f(self.comm), std::move(*comm), std::move(reading->run), std::move(reading->map));
   });
   if (code != VDI_CATALYST_OK) return code;
-  return guardedTogether(self, VDI_CATALYST_ENGINE, [&] { self.engine->start(place != Place::Simulation); });
+  return guardedTogether(self, VDI_CATALYST_ENGINE,
+                         [&] { self.engine->start(maker != FrameMaker::Simulation); });
 }
 
-int initializeAny(int32_t fortran_communicator, const char* json, Place place, vdi_catalyst** catalyst) {
+int initializeAny(int32_t fortran_communicator, const char* json, FrameMaker maker, vdi_catalyst** catalyst) {
   // Loader.c has checked that MPI runs and that the handle is a communicator's, and *catalyst is null.
   std::unique_ptr<vdi_catalyst> self;
   int code = vdi::catalyst::makeHandle(fortran_communicator, self);
   if (code != VDI_CATALYST_OK) return code;
-  code = start(*self, json, place);
+  code = start(*self, json, maker);
   if (code == VDI_CATALYST_OK) {
     *catalyst = alive() = self.release();
   } else {
@@ -129,12 +129,12 @@ int initializeAny(int32_t fortran_communicator, const char* json, Place place, v
 }
 
 int initializeJson(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
-  return initializeAny(fortran_communicator, json, Place::Simulation, catalyst);
+  return initializeAny(fortran_communicator, json, FrameMaker::Simulation, catalyst);
 }
 
 int makeFramesOfJson(int32_t fortran_communicator, const char* json, int goesOn, vdi_catalyst** catalyst) {
-  const Place place = goesOn != 0 ? Place::NextProcess : Place::Process;
-  return initializeAny(fortran_communicator, json, place, catalyst);
+  const FrameMaker maker = goesOn != 0 ? FrameMaker::NextProcess : FrameMaker::Process;
+  return initializeAny(fortran_communicator, json, maker, catalyst);
 }
 
 void setClock(vdi_catalyst* catalyst, double seconds) {
@@ -160,19 +160,8 @@ int wants(vdi_catalyst* catalyst, int64_t step, double time) {
 int execute(vdi_catalyst* catalyst, int64_t step, double time) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const auto start = std::chrono::steady_clock::now();
-  int code = guarded(
-      *catalyst, VDI_CATALYST_BAD_ARGUMENT,
-      [&] {
-        require(catalyst->haveBlocks, "no blocks were given yet");
-        require(step >= 0, "steps count from 0");
-        vdi::catalyst::requireTime(time);
-      },
-      step);
-  if (code == VDI_CATALYST_OK) {
-    code = guarded(
-        *catalyst, VDI_CATALYST_BAD_ARGUMENT,
-        [&] { requireEqual(catalyst->comm, step, "the ranks give different steps"); }, step);
-  }
+  int code =
+      vdi::catalyst::checkStep(*catalyst, step, time, [&] { require(step >= 0, "steps count from 0"); });
   if (code != VDI_CATALYST_OK || !catalyst->engine->mayExecute(step, time)) return code;
   // All ranks have met by now.
   const double waited = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -200,23 +189,15 @@ using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable, parametersOf>;
 
 }  // namespace
 
-const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
-    nullptr,
-    nullptr,
-    nullptr,
-    initializeJson,
-    makeFramesOfJson,
-    setBlocks,
-    Entries::setArray,
-    Entries::setArrayStrided,
-    Entries::setArrayOffset,
-    Entries::setParticles,
-    wants,
-    execute,
-    Entries::parameterF64,
-    Entries::parameterI64,
-    finalize,
-    Entries::error,
-    setClock,
-    logLeftOut,
-};
+constinit const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = [] {
+  vdi_catalyst_functions table = Entries::table();
+  table.initialize_json = initializeJson;
+  table.make_frames_of_json = makeFramesOfJson;
+  table.set_blocks = setBlocks;
+  table.wants = wants;
+  table.execute = execute;
+  table.finalize = finalize;
+  table.set_clock = setClock;
+  table.log_left_out = logLeftOut;
+  return table;
+}();

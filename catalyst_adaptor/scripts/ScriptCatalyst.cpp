@@ -39,7 +39,6 @@ using vdi::catalyst::guarded;
 using vdi::catalyst::guardedTogether;
 using vdi::catalyst::isStep;
 using vdi::catalyst::PythonLock;
-using vdi::catalyst::require;
 using vdi::catalyst::requireEqual;
 using vdi::catalyst::Script;
 using vdi::catalyst::ScriptLog;
@@ -93,10 +92,10 @@ void sayIfNothingIsMade(const vdi_catalyst& self, const std::vector<Script>& scr
 }
 
 /// The process that makes a run's frames: the simulation's, or a separate one.
-enum class Place { Simulation, Process };
+enum class FrameMaker { Simulation, Process };
 
 /// Opens the log that the first rank's VDI_LOG names.
-int openLog(vdi_catalyst& self, const std::vector<Script>& scripts, Place place) {
+int openLog(vdi_catalyst& self, const std::vector<Script>& scripts, FrameMaker maker) {
   int rank = 0;
   MPI_Comm_rank(self.comm, &rank);
   const int code = guarded(self, VDI_CATALYST_SCRIPT, [&] {
@@ -105,7 +104,7 @@ int openLog(vdi_catalyst& self, const std::vector<Script>& scripts, Place place)
     if (!files) return;
     vdi::runlog::RunStart start;
     start.unixTime = std::time(nullptr);
-    start.isIsolated = place == Place::Process;
+    start.isIsolated = maker == FrameMaker::Process;
     MPI_Comm_size(self.comm, &start.ranks);
     for (const Script& script : scripts) start.scripts.push_back(script.file);
     self.log = std::make_unique<ScriptLog>(*files, start);
@@ -157,7 +156,7 @@ int depositIfWanted(vdi_catalyst& self, std::int64_t step, double time) {
 
 /// `given`: the files, with or without arguments.
 template <typename Given>
-int initializeAny(int32_t fortran_communicator, int32_t script_count, const Given* given, Place place,
+int initializeAny(int32_t fortran_communicator, int32_t script_count, const Given* given, FrameMaker maker,
                   vdi_catalyst** catalyst) {
   const PythonLock lock;
   // Loader.c has checked that MPI runs and that the handle is a communicator's, and *catalyst is null.
@@ -180,7 +179,7 @@ int initializeAny(int32_t fortran_communicator, int32_t script_count, const Give
   }
   if (code == VDI_CATALYST_OK)
     code = guarded(*self, VDI_CATALYST_ENGINE, [&] { self->engine->loadPlugin(); });
-  if (code == VDI_CATALYST_OK) code = openLog(*self, scripts, place);
+  if (code == VDI_CATALYST_OK) code = openLog(*self, scripts, maker);
   if (code == VDI_CATALYST_OK) code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { self->engine->add(); });
   if (code != VDI_CATALYST_OK) {
     if (self->engine) spareEngine() = self->engine.release();
@@ -194,17 +193,17 @@ int initializeAny(int32_t fortran_communicator, int32_t script_count, const Give
 
 int initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
                vdi_catalyst** catalyst) {
-  return initializeAny(fortran_communicator, script_count, scripts, Place::Simulation, catalyst);
+  return initializeAny(fortran_communicator, script_count, scripts, FrameMaker::Simulation, catalyst);
 }
 
 int initializePipelines(int32_t fortran_communicator, int32_t script_count,
                         const vdi_catalyst_pipeline* scripts, vdi_catalyst** catalyst) {
-  return initializeAny(fortran_communicator, script_count, scripts, Place::Simulation, catalyst);
+  return initializeAny(fortran_communicator, script_count, scripts, FrameMaker::Simulation, catalyst);
 }
 
 int makeFramesOfPipelines(int32_t fortran_communicator, int32_t script_count,
                           const vdi_catalyst_pipeline* scripts, vdi_catalyst** catalyst) {
-  return initializeAny(fortran_communicator, script_count, scripts, Place::Process, catalyst);
+  return initializeAny(fortran_communicator, script_count, scripts, FrameMaker::Process, catalyst);
 }
 
 int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
@@ -242,19 +241,7 @@ int execute(vdi_catalyst* catalyst, int64_t step, double time) {
   if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const PythonLock lock;
   const auto begin = Clock::now();
-  int code = guarded(
-      *catalyst, VDI_CATALYST_BAD_ARGUMENT,
-      [&] {
-        require(catalyst->haveBlocks, "no blocks were given yet");
-        vdi::catalyst::requireStep(step);
-        vdi::catalyst::requireTime(time);
-      },
-      step);
-  if (code == VDI_CATALYST_OK) {
-    code = guarded(
-        *catalyst, VDI_CATALYST_BAD_ARGUMENT,
-        [&] { requireEqual(catalyst->comm, step, "the ranks give different steps"); }, step);
-  }
+  int code = vdi::catalyst::checkStep(*catalyst, step, time, [&] { vdi::catalyst::requireStep(step); });
   if (code != VDI_CATALYST_OK) return code;
   // All ranks have met by now.
   const std::chrono::duration<double, std::milli> waited = Clock::now() - begin;
@@ -300,23 +287,15 @@ using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable, parametersOf, 
 
 }  // namespace
 
-const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = {
-    initialize,
-    initializePipelines,
-    makeFramesOfPipelines,
-    nullptr,
-    nullptr,
-    setBlocks,
-    Entries::setArray,
-    Entries::setArrayStrided,
-    Entries::setArrayOffset,
-    Entries::setParticles,
-    wants,
-    execute,
-    Entries::parameterF64,
-    Entries::parameterI64,
-    finalize,
-    Entries::error,
-    nullptr,
-    logLeftOut,
-};
+constinit const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = [] {
+  vdi_catalyst_functions table = Entries::table();
+  table.initialize = initialize;
+  table.initialize_pipelines = initializePipelines;
+  table.make_frames_of_pipelines = makeFramesOfPipelines;
+  table.set_blocks = setBlocks;
+  table.wants = wants;
+  table.execute = execute;
+  table.finalize = finalize;
+  table.log_left_out = logLeftOut;
+  return table;
+}();
