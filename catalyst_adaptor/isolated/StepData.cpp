@@ -64,53 +64,132 @@ void copyColumn(const NumberColumn& column, std::uint64_t count, std::byte* to) 
     std::memcpy(to + i * bytes, column.first + static_cast<std::int64_t>(i) * column.stride, bytes);
 }
 
+/// Describes fields, and places their values one after the other. Offsets count from the end of the
+/// descriptions, whose size isn't known before.
+class Placement {
+ public:
+  explicit Placement(Packer& head) : head_(head) {}
+
+  void put(const Fields::NamedArray& array) {
+    head_.putText(array.name);
+    head_.put(array.cells);
+    head_.put(std::int32_t{array.type});
+    head_.put(std::int32_t{componentsOf(array)});
+    for (int axis = 0; axis < 3; ++axis) head_.put(array.offset[axis]);
+    for (const StridedValues& values : array.blocks) place(values.first != nullptr, values.bytes());
+  }
+  void put(const StepFields::NamedParticles& particles) {
+    const auto& [name, array, offset] = particles;
+    head_.putText(name);
+    for (int axis = 0; axis < 3; ++axis) head_.put(offset[axis]);
+    head_.put(array.kind);
+    head_.put(std::uint64_t{array.particles.count});
+    for (const NumberColumn& column : columnsOf(array.particles)) {
+      head_.put(column.isDouble);
+      head_.put(column.stride == 0);
+      place(static_cast<bool>(column), countOf(column, array.particles.count) * bytesOf(column));
+    }
+  }
+  std::uint64_t end() const { return end_; }
+  const std::vector<std::uint64_t>& offsets() const { return offsets_; }
+
+ private:
+  void place(bool exists, std::uint64_t bytes) {
+    head_.put(exists ? end_ : none);
+    if (!exists) return;
+    offsets_.push_back(end_);
+    end_ = aligned(end_ + bytes);
+  }
+
+  Packer& head_;
+  std::uint64_t end_ = 0;
+  std::vector<std::uint64_t> offsets_;
+};
+
+/// Reads a step's descriptions, and finds the values.
+class StepReader {
+ public:
+  explicit StepReader(std::span<const std::byte> from)
+      : from_(from), head_(from), begin_(head_.take<std::uint64_t>()) {}
+
+  template <typename Value>
+  Value take() {
+    return head_.take<Value>();
+  }
+  StepData::Array takeArray(const std::vector<vdi_catalyst_block>& blocks) {
+    StepData::Array array;
+    array.name = head_.takeText();
+    array.cells = take<bool>();
+    array.type = take<std::int32_t>();
+    array.components = take<std::int32_t>();
+    for (double& offset : array.offset) offset = take<double>();
+    for (const vdi_catalyst_block& block : blocks) array.blocks.push_back(placed(placedBytes(block, array)));
+    return array;
+  }
+  StepData::Particles takeParticles() {
+    StepData::Particles particles;
+    vdi_catalyst_particles& given = particles.given;
+    particles.name = head_.takeText();
+    for (double& offset : particles.offset) offset = take<double>();
+    given.kind = take<DepositKind>() == DepositKind::Density ? VDI_CATALYST_DENSITY : VDI_CATALYST_SUM;
+    given.count = static_cast<std::int64_t>(take<std::uint64_t>());
+    if (given.count < 0) throw std::runtime_error("a step's particles are more than can be counted");
+    const auto column = [&](const void*& first, std::int32_t& type, std::int64_t& stride) {
+      const auto isDouble = take<bool>();
+      const auto isOne = take<bool>();
+      type = isDouble ? VDI_CATALYST_F64 : VDI_CATALYST_F32;
+      const std::size_t bytes = isDouble ? sizeof(double) : sizeof(float);
+      stride = isOne ? 0 : static_cast<std::int64_t>(bytes);
+      const auto count = static_cast<double>(given.count);
+      first = placed(static_cast<double>(bytes) * (isOne ? std::min(count, 1.0) : count));
+    };
+    for (const void*& position : given.positions)
+      column(position, given.position_type, given.position_stride);
+    column(given.weights, given.weight_type, given.weight_stride);
+    column(given.lengths, given.length_type, given.length_stride);
+    return particles;
+  }
+  Parameter takeParameter() {
+    Parameter parameter;
+    parameter.name = head_.takeText();
+    parameter.isWhole = take<bool>();
+    parameter.value = take<double>();
+    parameter.low = take<double>();
+    parameter.high = take<double>();
+    return parameter;
+  }
+
+ private:
+  /// That many bytes of data at the next offset; null if there is no offset.
+  const std::byte* placed(double bytes) {
+    const auto offset = take<std::uint64_t>();
+    if (offset == none) return nullptr;
+    // An array without values may lie at the end of the memory.
+    if (begin_ > from_.size() || offset > from_.size() - begin_ ||
+        bytes > static_cast<double>(from_.size() - begin_ - offset))
+      throw std::runtime_error("a step's values lie outside the shared memory");
+    return from_.data() + begin_ + offset;
+  }
+
+  std::span<const std::byte> from_;
+  Unpacker head_;
+  std::uint64_t begin_;
+};
+
 }  // namespace
 
 StepWriter::StepWriter(std::uint64_t version, const std::vector<vdi_catalyst_block>& blocks,
                        StepFields fields, const std::vector<Parameter>& parameters)
     : fields_(std::move(fields)) {
-  // Offsets of values count from the end of the head, whose size isn't known before.
-  std::uint64_t end = 0;
   Packer head;
+  Placement placement(head);
   head.put(version);
   head.put(std::uint64_t{blocks.size()});
   for (const vdi_catalyst_block& block : blocks) head.put(block);
-  const auto place = [&](std::uint64_t bytes) {
-    head.put(end);
-    offsets_.push_back(end);
-    end = aligned(end + bytes);
-  };
   head.put(std::uint64_t{fields_.arrays.size()});
-  for (const Fields::NamedArray& array : fields_.arrays) {
-    head.putText(array.name);
-    head.put(array.cells);
-    head.put(std::int32_t{array.type});
-    head.put(std::int32_t{componentsOf(array)});
-    for (int axis = 0; axis < 3; ++axis) head.put(array.offset[axis]);
-    for (const StridedValues& values : array.blocks) {
-      if (values.first != nullptr) {
-        place(values.bytes());
-      } else {
-        head.put(none);
-      }
-    }
-  }
+  for (const Fields::NamedArray& array : fields_.arrays) placement.put(array);
   head.put(std::uint64_t{fields_.particles.size()});
-  for (const auto& [name, array, offset] : fields_.particles) {
-    head.putText(name);
-    for (int axis = 0; axis < 3; ++axis) head.put(offset[axis]);
-    head.put(array.kind);
-    head.put(std::uint64_t{array.particles.count});
-    for (const NumberColumn& column : columnsOf(array.particles)) {
-      head.put(column.isDouble);
-      head.put(column.stride == 0);
-      if (column) {
-        place(countOf(column, array.particles.count) * bytesOf(column));
-      } else {
-        head.put(none);
-      }
-    }
-  }
+  for (const StepFields::NamedParticles& particles : fields_.particles) placement.put(particles);
   head.put(std::uint64_t{parameters.size()});
   for (const Parameter& parameter : parameters) {
     head.putText(parameter.name);
@@ -124,8 +203,8 @@ StepWriter::StepWriter(std::uint64_t version, const std::vector<vdi_catalyst_blo
   head_.assign(size.bytes().begin(), size.bytes().end());
   head_.insert(head_.end(), head.bytes().begin(), head.bytes().end());
   const std::uint64_t begin = aligned(head_.size());
-  for (std::uint64_t& offset : offsets_) offset += begin;
-  bytes_ = begin + end;
+  for (const std::uint64_t offset : placement.offsets()) offsets_.push_back(begin + offset);
+  bytes_ = begin + placement.end();
 }
 
 void StepWriter::write(std::span<std::byte> to) const {
@@ -146,62 +225,17 @@ void StepWriter::write(std::span<std::byte> to) const {
 }
 
 StepData StepData::read(std::span<const std::byte> from) {
-  Unpacker head(from);
-  const auto begin = head.take<std::uint64_t>();
-  // That many bytes of data at the next offset; null if there is no offset.
-  const auto placed = [&](double bytes) -> const std::byte* {
-    const auto offset = head.take<std::uint64_t>();
-    if (offset == none) return nullptr;
-    // An array without values may lie at the end of the memory.
-    if (begin > from.size() || offset > from.size() - begin ||
-        bytes > static_cast<double>(from.size() - begin - offset))
-      throw std::runtime_error("a step's values lie outside the shared memory");
-    return from.data() + begin + offset;
-  };
+  StepReader reader(from);
   StepData step;
-  step.version = head.take<std::uint64_t>();
-  for (auto blocks = head.take<std::uint64_t>(); blocks > 0; --blocks)
-    step.blocks.push_back(head.take<vdi_catalyst_block>());
-  for (auto arrays = head.take<std::uint64_t>(); arrays > 0; --arrays) {
-    Array& array = step.arrays.emplace_back();
-    array.name = head.takeText();
-    array.cells = head.take<bool>();
-    array.type = head.take<std::int32_t>();
-    array.components = head.take<std::int32_t>();
-    for (double& offset : array.offset) offset = head.take<double>();
-    for (const vdi_catalyst_block& block : step.blocks)
-      array.blocks.push_back(placed(placedBytes(block, array)));
-  }
-  for (auto particles = head.take<std::uint64_t>(); particles > 0; --particles) {
-    StepData::Particles& one = step.particles.emplace_back();
-    vdi_catalyst_particles& given = one.given;
-    one.name = head.takeText();
-    for (double& offset : one.offset) offset = head.take<double>();
-    given.kind = head.take<DepositKind>() == DepositKind::Density ? VDI_CATALYST_DENSITY : VDI_CATALYST_SUM;
-    given.count = static_cast<std::int64_t>(head.take<std::uint64_t>());
-    if (given.count < 0) throw std::runtime_error("a step's particles are more than can be counted");
-    const auto column = [&](const void*& first, std::int32_t& type, std::int64_t& stride) {
-      const auto isDouble = head.take<bool>();
-      const auto isOne = head.take<bool>();
-      type = isDouble ? VDI_CATALYST_F64 : VDI_CATALYST_F32;
-      const std::size_t bytes = isDouble ? sizeof(double) : sizeof(float);
-      stride = isOne ? 0 : static_cast<std::int64_t>(bytes);
-      const auto count = static_cast<double>(given.count);
-      first = placed(static_cast<double>(bytes) * (isOne ? std::min(count, 1.0) : count));
-    };
-    for (const void*& position : given.positions)
-      column(position, given.position_type, given.position_stride);
-    column(given.weights, given.weight_type, given.weight_stride);
-    column(given.lengths, given.length_type, given.length_stride);
-  }
-  for (auto parameters = head.take<std::uint64_t>(); parameters > 0; --parameters) {
-    Parameter& parameter = step.parameters.emplace_back();
-    parameter.name = head.takeText();
-    parameter.isWhole = head.take<bool>();
-    parameter.value = head.take<double>();
-    parameter.low = head.take<double>();
-    parameter.high = head.take<double>();
-  }
+  step.version = reader.take<std::uint64_t>();
+  for (auto blocks = reader.take<std::uint64_t>(); blocks > 0; --blocks)
+    step.blocks.push_back(reader.take<vdi_catalyst_block>());
+  for (auto arrays = reader.take<std::uint64_t>(); arrays > 0; --arrays)
+    step.arrays.push_back(reader.takeArray(step.blocks));
+  for (auto particles = reader.take<std::uint64_t>(); particles > 0; --particles)
+    step.particles.push_back(reader.takeParticles());
+  for (auto parameters = reader.take<std::uint64_t>(); parameters > 0; --parameters)
+    step.parameters.push_back(reader.takeParameter());
   return step;
 }
 
