@@ -57,7 +57,7 @@ class Continuation {
   /// Fills the open places next to known values. Returns false if there are none.
   bool advance() {
     filled_.clear();
-    const auto fill = [this](const Place& place) {
+    const auto fill = [this](const OpenPlace& place) {
       const std::optional<double> value = continuedAt(place);
       if (value) filled_.push_back({place, *value});
       return value.has_value();
@@ -80,8 +80,8 @@ class Continuation {
   }
 
  private:
-  /// An open place. There are many, so each is small.
-  struct Place {
+  /// There are many, so each is small.
+  struct OpenPlace {
     std::size_t position;  // in the patch's window
     std::uint32_t patch;
     glm::ivec3 at;
@@ -129,7 +129,7 @@ class Continuation {
   }
 
   /// The mean over the axes that lead to known values.
-  std::optional<double> continuedAt(const Place& place) const {
+  std::optional<double> continuedAt(const OpenPlace& place) const {
     const Window& window = windowOf(place.patch);
     double sum = 0.0;
     int count = 0;
@@ -168,8 +168,8 @@ class Continuation {
   const IndexBox core_;
   std::span<const OpenPatch> patches_;
   std::vector<Window> windows_;  // one for all patches, or one for each
-  std::vector<Place> open_;
-  std::vector<std::pair<Place, double>> filled_;  // places that the current step has filled
+  std::vector<OpenPlace> open_;
+  std::vector<std::pair<OpenPlace, double>> filled_;  // places that the current step has filled
 };
 
 }  // namespace

@@ -89,7 +89,7 @@ void ListDownload<Segment>::finish() {
 template <typename Segment>
 void ListDownload<Segment>::downloadOffsets() {
   memory_.commands.begin();
-  for (const Band& band : bands_) {
+  for (const SentBand& band : bands_) {
     const std::uint32_t behind = band.firstList + band.listCount == listCount_ ? 1 : 0;
     memory_.scan.recordRebase(memory_.commands, memory_.offsets, band.firstList, band.listCount + behind,
                               static_cast<std::uint32_t>(band.firstSegment));

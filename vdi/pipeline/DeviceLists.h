@@ -79,7 +79,7 @@ class ListDownload {
   bool isWhole() const { return bands_.size() == 1 && bands_.front().listCount == listCount_; }
   void waitForTransfers();
 
-  struct Band {
+  struct SentBand {
     std::uint64_t firstList = 0;
     std::uint32_t listCount = 0;
     std::uint64_t firstSegment = 0;
@@ -89,7 +89,7 @@ class ListDownload {
   DownloadMemory& memory_;
   std::uint64_t listCount_;
   std::uint64_t firstList_ = 0;  // first list of the next band
-  std::vector<Band> bands_;
+  std::vector<SentBand> bands_;
 };
 
 }  // namespace vdi::detail

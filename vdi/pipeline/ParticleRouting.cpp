@@ -68,7 +68,7 @@ struct ParticleRouting::Cells {
   IndexBox all;         // parts that the particle meets, inside the block or not
   IndexBox stored;      // parts of `all` inside the block
 
-  Cells(const Spread& spread, const Place& place) {
+  Cells(const Spread& spread, const PlacedBlock& place) {
     if (spread.h > 0.0) {
       parts = glm::ivec3(glm::clamp(glm::round(place.spacing / spread.owner->spacing), glm::dvec3(1.0),
                                     glm::dvec3(mostKernelParts)));
@@ -87,7 +87,7 @@ struct ParticleRouting::Cells {
     return size.x * size.y * size.z;
   }
   /// Cells that lie in `all`, in the world.
-  Box box(const Place& place) const {
+  Box box(const PlacedBlock& place) const {
     return {place.lower + glm::dvec3(all.lo) * spacing, place.lower + glm::dvec3(all.hi) * spacing};
   }
 };
@@ -100,7 +100,7 @@ ParticleRouting::ParticleRouting(const comm::Communicator& comm, const std::vect
     for (const comm::BlockEntry& entry : directory_.entries()) {
       places_.push_back(
           {entry.origin - 0.5 * entry.spacing, entry.spacing, entry.dims, entry.rank, entry.block});
-      Place& place = places_.back();
+      PlacedBlock& place = places_.back();
       place.stored = {place.lower, place.lower + glm::dvec3(place.cells) * place.spacing};
       all.include(entry.owned);
     }
@@ -140,7 +140,7 @@ void ParticleRouting::findOwned(const comm::Communicator& comm) {
 void ParticleRouting::findLattices() {
   using Key = std::array<double, 6>;
   std::map<Key, std::size_t> lattices;
-  for (Place& place : places_) {
+  for (PlacedBlock& place : places_) {
     Key key{};
     for (int axis = 0; axis < 3; ++axis) {
       const auto i = static_cast<std::size_t>(axis);
@@ -154,7 +154,7 @@ void ParticleRouting::findLattices() {
 }
 
 void ParticleRouting::findNear() {
-  for (Place& place : places_) {
+  for (PlacedBlock& place : places_) {
     Box around;
     for (const Box& box : place.owned) around.include(box);
     if (around.empty()) continue;
@@ -163,8 +163,8 @@ void ParticleRouting::findNear() {
 }
 
 /// Finds the blocks with cells among those that the particle meets.
-void ParticleRouting::findMet(const Spread& spread, std::vector<const Place*>& met) const {
-  const Place& owner = *spread.owner;
+void ParticleRouting::findMet(const Spread& spread, std::vector<const PlacedBlock*>& met) const {
+  const PlacedBlock& owner = *spread.owner;
   const Box box = Cells(spread, owner).box(owner);
   const glm::dvec3 slack = coincidence * owner.spacing;
   const auto find = [&](const std::vector<std::size_t>& among) {
@@ -184,7 +184,7 @@ void ParticleRouting::findMet(const Spread& spread, std::vector<const Place*>& m
 std::size_t ParticleRouting::route(const Particles& particles, std::size_t first, std::size_t last,
                                    int exponent, std::size_t enough, std::vector<RoutedParticle>& routed,
                                    ParticleCounts& counts) const {
-  std::vector<const Place*> met;
+  std::vector<const PlacedBlock*> met;
   std::size_t i = first;
   for (; i < last && routed.size() < enough; ++i) {
     const std::optional<Spread> spread = spreadOf(particles, i, counts);
@@ -225,8 +225,9 @@ std::optional<ParticleRouting::Spread> ParticleRouting::spreadOf(const Particles
 }
 
 /// Whether the particle meets only cells of its owner's lattice, all of them owned by some block.
-bool ParticleRouting::isWithinOneLattice(const Spread& spread, std::span<const Place* const> met) const {
-  const Place& owner = *spread.owner;
+bool ParticleRouting::isWithinOneLattice(const Spread& spread,
+                                         std::span<const PlacedBlock* const> met) const {
+  const PlacedBlock& owner = *spread.owner;
   const Box cells = Cells(spread, owner).box(owner);
   if (met.size() == 1 && owner.owned.size() == 1) {
     const glm::dvec3 slack = coincidence * owner.spacing;
@@ -235,7 +236,7 @@ bool ParticleRouting::isWithinOneLattice(const Spread& spread, std::span<const P
            glm::all(glm::lessThanEqual(cells.hi, box.hi + slack));
   }
   double covered = 0.0;
-  for (const Place* place : met) {
+  for (const PlacedBlock* place : met) {
     if (place->lattice != owner.lattice) return false;
     for (const Box& box : place->owned) covered += volumeOf(box.intersection(cells));
   }
@@ -243,11 +244,11 @@ bool ParticleRouting::isWithinOneLattice(const Spread& spread, std::span<const P
 }
 
 /// The sum of the particle's shares over all owned cells.
-double ParticleRouting::sumOf(const Spread& spread, std::span<const Place* const> met) const {
+double ParticleRouting::sumOf(const Spread& spread, std::span<const PlacedBlock* const> met) const {
   double sum = 0.0;
   std::array<std::vector<double>, 3> shares;  // share of each part, by its index in the range
-  for (const Place* one : met) {
-    const Place& place = *one;
+  for (const PlacedBlock* one : met) {
+    const PlacedBlock& place = *one;
     const Cells cells(spread, place);
     const IndexBox& range = cells.stored;
     if (range.empty()) continue;
@@ -309,7 +310,7 @@ double ParticleRouting::peakOf(const Spread& spread) {
 }
 
 /// `met` is memory that all calls reuse.
-void ParticleRouting::send(Spread spread, int exponent, std::vector<const Place*>& met,
+void ParticleRouting::send(Spread spread, int exponent, std::vector<const PlacedBlock*>& met,
                            std::vector<RoutedParticle>& routed) const {
   double sum = 1.0;
   findMet(spread, met);
@@ -322,8 +323,8 @@ void ParticleRouting::send(Spread spread, int exponent, std::vector<const Place*
     isSummed = !isWithinOneLattice(spread, met);
     sum = isSummed ? sumOf(spread, met) : 1.0;
   }
-  for (const Place* to : met) {
-    const Place& place = *to;
+  for (const PlacedBlock* to : met) {
+    const PlacedBlock& place = *to;
     const Cells cells(spread, place);
     if (cells.stored.empty()) continue;
     const glm::dvec3 cell = glm::floor(cells.at);

@@ -38,7 +38,7 @@ class ParticleRouting {
 
  private:
   /// A block of any rank.
-  struct Place {
+  struct PlacedBlock {
     glm::dvec3 lower;  // corner of the first stored cell
     glm::dvec3 spacing;
     glm::ivec3 cells;
@@ -47,11 +47,11 @@ class ParticleRouting {
     std::size_t lattice = 0;          // equal for blocks whose cells continue each other
     std::vector<Box> owned{};         // disjoint
     Box stored{};                     // all cells
-    std::vector<std::size_t> near{};  // places that a cloud around a position in `owned` may meet
+    std::vector<std::size_t> near{};  // indices of blocks that a cloud around a position in `owned` may meet
   };
   /// The spread of a particle.
   struct Spread {
-    const Place* owner;
+    const PlacedBlock* owner;
     glm::dvec3 position;
     double weight;
     double h;  // 0: cloud in cell
@@ -68,11 +68,11 @@ class ParticleRouting {
   void findLattices();
   void findNear();
   std::optional<Spread> spreadOf(const Particles& particles, std::size_t index, ParticleCounts& counts) const;
-  void findMet(const Spread& spread, std::vector<const Place*>& met) const;
-  bool isWithinOneLattice(const Spread& spread, std::span<const Place* const> met) const;
-  double sumOf(const Spread& spread, std::span<const Place* const> met) const;
+  void findMet(const Spread& spread, std::vector<const PlacedBlock*>& met) const;
+  bool isWithinOneLattice(const Spread& spread, std::span<const PlacedBlock* const> met) const;
+  double sumOf(const Spread& spread, std::span<const PlacedBlock* const> met) const;
   static double peakOf(const Spread& spread);
-  void send(Spread spread, int exponent, std::vector<const Place*>& met,
+  void send(Spread spread, int exponent, std::vector<const PlacedBlock*>& met,
             std::vector<RoutedParticle>& routed) const;
 
   struct OwnedBox {
@@ -80,7 +80,7 @@ class ParticleRouting {
     std::uint64_t place;
   };
   comm::BlockDirectory directory_;
-  std::vector<Place> places_;  // in the order of the directory's entries
+  std::vector<PlacedBlock> places_;  // in the order of the directory's entries
   std::vector<OwnedBox> owned_;
   std::unique_ptr<comm::BoxTree> ownedTree_;  // of owned_
   int mostCells_;

@@ -14,13 +14,13 @@ namespace pv {
 
 namespace {
 
-struct Place {
+struct Knot {
   double x = 0.0;
   glm::dvec3 value{0.0};  // a colour, or an opacity in each component
 };
 
 struct ControlPoint {
-  Place place;
+  Knot knot;
   bool linear = false;  // whether a straight line leads to the next point
 };
 
@@ -33,9 +33,9 @@ class Curve {
   virtual ~Curve() = default;
 
   virtual std::vector<ControlPoint> points() const = 0;
-  /// Returns `count` >= 1 places from `first` to `last`, evenly spaced, or with evenly spaced logarithms if
+  /// Returns `count` >= 1 knots from `first` to `last`, evenly spaced, or with evenly spaced logarithms if
   /// the function has a logarithmic scale.
-  virtual std::vector<Place> sampled(double first, double last, std::size_t count) const = 0;
+  virtual std::vector<Knot> sampled(double first, double last, std::size_t count) const = 0;
   virtual double tolerance() const { return 1e-3; }
 };
 
@@ -61,16 +61,16 @@ class ColorCurve : public Curve {
     }
     return points;
   }
-  std::vector<Place> sampled(double first, double last, std::size_t count) const override {
+  std::vector<Knot> sampled(double first, double last, std::size_t count) const override {
     // GetColor is unsuitable: it looks up discrete values and categories.
     std::vector<double> table(3 * count);
     function_->GetTable(first, last, static_cast<int>(count), table.data());
-    std::vector<Place> places;
+    std::vector<Knot> knots;
     for (std::size_t i = 0; i < count; ++i) {
-      places.push_back({between(first, last, i, count, logarithmic()),
-                        {table[3 * i], table[3 * i + 1], table[3 * i + 2]}});
+      knots.push_back({between(first, last, i, count, logarithmic()),
+                       {table[3 * i], table[3 * i + 1], table[3 * i + 2]}});
     }
-    return places;
+    return knots;
   }
   /// VTK rounds what it interpolates by CIEDE2000 to 8 bits.
   double tolerance() const override {
@@ -97,14 +97,14 @@ class OpacityCurve : public Curve {
     }
     return points;
   }
-  std::vector<Place> sampled(double first, double last, std::size_t count) const override {
-    std::vector<Place> places;
+  std::vector<Knot> sampled(double first, double last, std::size_t count) const override {
+    std::vector<Knot> knots;
     if (count == 1) return {{0.5 * (first + last), glm::dvec3(function_->GetValue(0.5 * (first + last)))}};
     std::vector<double> table(count);
     function_->GetTable(first, last, static_cast<int>(count), table.data(), 1, logarithmic() ? 1 : 0);
     for (std::size_t i = 0; i < count; ++i)
-      places.push_back({between(first, last, i, count, logarithmic()), glm::dvec3(table[i])});
-    return places;
+      knots.push_back({between(first, last, i, count, logarithmic()), glm::dvec3(table[i])});
+    return knots;
   }
 
  private:
@@ -117,7 +117,7 @@ double difference(const glm::dvec3& a, const glm::dvec3& b) {
   return std::max({apart.x, apart.y, apart.z});
 }
 
-/// Whether double precision can tell places between `first` and `last` apart.
+/// Whether double precision can tell values between `first` and `last` apart.
 bool isWide(double first, double last) {
   return 1e-6 * (last - first) > 1e-13 * std::max(std::abs(first), std::abs(last));
 }
@@ -125,74 +125,74 @@ bool isWide(double first, double last) {
 /// Samples a stretch without control points. It samples more finely around jumps, and in the end represents a
 /// jump by a step.
 void addSamples(const Curve& curve, double first, double last, std::size_t count, int levels,
-                std::vector<Place>& places) {
+                std::vector<Knot>& knots) {
   constexpr std::size_t finer = 17;
   constexpr double coarse = 1.0 / 32.0;
-  const std::vector<Place> samples = curve.sampled(first, last, count);
+  const std::vector<Knot> samples = curve.sampled(first, last, count);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (i > 0 && difference(samples[i - 1].value, samples[i].value) > coarse) {
       const double front = samples[i - 1].x;
       const double back = samples[i].x;
       if (levels > 0 && isWide(front, back)) {
-        addSamples(curve, front, back, finer, levels - 1, places);
+        addSamples(curve, front, back, finer, levels - 1, knots);
       } else {
-        places.push_back({0.5 * (front + back), samples[i - 1].value});
-        places.push_back({0.5 * (front + back), samples[i].value});
+        knots.push_back({0.5 * (front + back), samples[i - 1].value});
+        knots.push_back({0.5 * (front + back), samples[i].value});
       }
     }
-    places.push_back(samples[i]);
+    knots.push_back(samples[i]);
   }
 }
 
-/// Leaves out places on the straight line between others.
-void simplify(std::vector<Place>& places, double tolerance) {
-  std::vector<Place> kept;
+/// Leaves out knots on the straight line between others.
+void simplify(std::vector<Knot>& knots, double tolerance) {
+  std::vector<Knot> kept;
   const auto isStraight = [&](std::size_t first, std::size_t last) {
-    const double length = places[last].x - places[first].x;
+    const double length = knots[last].x - knots[first].x;
     for (std::size_t i = first + 1; i < last; ++i) {
-      const double share = length > 0.0 ? (places[i].x - places[first].x) / length : 0.0;
-      const glm::dvec3 line = glm::mix(places[first].value, places[last].value, share);
-      if (!(difference(line, places[i].value) <= tolerance)) return false;
+      const double share = length > 0.0 ? (knots[i].x - knots[first].x) / length : 0.0;
+      const glm::dvec3 line = glm::mix(knots[first].value, knots[last].value, share);
+      if (!(difference(line, knots[i].value) <= tolerance)) return false;
     }
     return true;
   };
-  for (std::size_t at = 0; at < places.size();) {
-    kept.push_back(places[at]);
+  for (std::size_t at = 0; at < knots.size();) {
+    kept.push_back(knots[at]);
     std::size_t next = at + 1;
-    while (next + 1 < places.size() && isStraight(at, next + 1)) ++next;
+    while (next + 1 < knots.size() && isStraight(at, next + 1)) ++next;
     at = next;
   }
-  places = std::move(kept);
+  knots = std::move(kept);
 }
 
-/// The places from one control point to the next, both included.
-std::vector<Place> placesBetween(const Curve& curve, const ControlPoint& from, const Place& to,
-                                 std::size_t count) {
+/// The knots from one control point to the next, both included.
+std::vector<Knot> knotsBetween(const Curve& curve, const ControlPoint& from, const Knot& to,
+                               std::size_t count) {
   constexpr int levels = 3;
-  const double first = from.place.x;
+  const double first = from.knot.x;
   const double inset = 1e-6 * (to.x - first);  // VTK's value at a control point differs from those beside it
-  std::vector<Place> places{from.place};
+  std::vector<Knot> knots{from.knot};
   if (!from.linear && isWide(first, to.x)) {
-    std::vector<Place> samples;
+    std::vector<Knot> samples;
     addSamples(curve, first + inset, to.x - inset, count, levels, samples);
-    const bool sound = std::all_of(samples.begin(), samples.end(), [](const Place& place) {
-      return std::isfinite(place.x) && std::isfinite(place.value.x + place.value.y + place.value.z);
+    const bool sound = std::all_of(samples.begin(), samples.end(), [](const Knot& knot) {
+      return std::isfinite(knot.x) && std::isfinite(knot.value.x + knot.value.y + knot.value.z);
     });
     if (sound) {  // logarithms are finite only for positive numbers
       samples.front().x = first;
       samples.back().x = to.x;
-      places.insert(places.end(), samples.begin(), samples.end());
+      knots.insert(knots.end(), samples.begin(), samples.end());
     }
   }
-  places.push_back(to);
-  simplify(places, curve.tolerance());
-  return places;
+  knots.push_back(to);
+  simplify(knots, curve.tolerance());
+  return knots;
 }
 
 /// Puts a jump at the function's ends a little outside, so that scalars at the ends aren't affected.
-void addJumpsAtEnds(const Curve& curve, std::vector<Place>& places) {
-  const Place first = places.front();
-  const Place last = places.back();
+void addJumpsAtEnds(const Curve& curve, std::vector<Knot>& knots) {
+  const Knot first = knots.front();
+  const Knot last = knots.back();
   const double width = last.x - first.x;
   const double gap = width > 0.0 ? width / 512.0 : std::max(1e-3 * std::abs(first.x), 1e-6);
   const double gapBelow = first.x > 0.0 ? std::min(gap, 0.5 * first.x) : gap;  // positive, for logarithms
@@ -200,36 +200,36 @@ void addJumpsAtEnds(const Curve& curve, std::vector<Place>& places) {
   const glm::dvec3 above = curve.sampled(last.x + gap, last.x + gap, 1).front().value;
   if (difference(below, first.value) > curve.tolerance()) {
     const double jump = first.x - 0.5 * gapBelow;
-    places.insert(places.begin(), {{first.x - gapBelow, below}, {jump, below}, {jump, first.value}});
+    knots.insert(knots.begin(), {{first.x - gapBelow, below}, {jump, below}, {jump, first.value}});
   }
   if (difference(above, last.value) > curve.tolerance()) {
     const double jump = last.x + 0.5 * gap;
-    places.insert(places.end(), {{jump, last.value}, {jump, above}, {last.x + gap, above}});
+    knots.insert(knots.end(), {{jump, last.value}, {jump, above}, {last.x + gap, above}});
   }
 }
 
-/// The places between which straight lines form the function.
-std::vector<Place> placesOf(const Curve& curve) {
+/// The knots between which straight lines form the function.
+std::vector<Knot> knotsOf(const Curve& curve) {
   constexpr std::size_t samplesInAll = 16384;
   constexpr std::size_t fewest = 9;
   constexpr std::size_t most = 129;
   const std::vector<ControlPoint> points = curve.points();
-  std::vector<Place> places;
-  if (points.empty()) return places;
+  std::vector<Knot> knots;
+  if (points.empty()) return knots;
   const std::size_t count = std::clamp(samplesInAll / points.size(), fewest, most);
   for (std::size_t i = 0; i + 1 < points.size(); ++i) {
-    const std::vector<Place> more = placesBetween(curve, points[i], points[i + 1].place, count);
-    places.insert(places.end(), more.begin(), std::prev(more.end()));
+    const std::vector<Knot> more = knotsBetween(curve, points[i], points[i + 1].knot, count);
+    knots.insert(knots.end(), more.begin(), std::prev(more.end()));
   }
-  places.push_back(points.back().place);
-  addJumpsAtEnds(curve, places);
-  return places;
+  knots.push_back(points.back().knot);
+  addJumpsAtEnds(curve, knots);
+  return knots;
 }
 
-std::vector<vdi::ColorNode> colorNodes(const std::vector<Place>& places) {
+std::vector<vdi::ColorNode> colorNodes(const std::vector<Knot>& knots) {
   std::vector<vdi::ColorNode> nodes;
-  nodes.reserve(places.size());
-  for (const Place& place : places) nodes.push_back({place.x, glm::clamp(place.value, 0.0, 1.0)});
+  nodes.reserve(knots.size());
+  for (const Knot& knot : knots) nodes.push_back({knot.x, glm::clamp(knot.value, 0.0, 1.0)});
   return nodes;
 }
 
@@ -264,7 +264,7 @@ vdi::TransferFunction transferFunctionOf(vtkScalarsToColors* colors, vtkPiecewis
   function.unitDistance = unitDistance;
   const vtkSmartPointer<vtkScalarsToColors> map = colors != nullptr ? colors : coolToWarm(low, high).Get();
   auto* curve = vtkColorTransferFunction::SafeDownCast(map);
-  function.colors = curve != nullptr ? colorNodes(placesOf(ColorCurve(curve))) : colorNodes(map.Get());
+  function.colors = curve != nullptr ? colorNodes(knotsOf(ColorCurve(curve))) : colorNodes(map.Get());
   if (auto* own = vtkDiscretizableColorTransferFunction::SafeDownCast(map);
       own != nullptr && opacity == nullptr)
     opacity = own->GetScalarOpacityFunction();
@@ -272,8 +272,8 @@ vdi::TransferFunction transferFunctionOf(vtkScalarsToColors* colors, vtkPiecewis
     function.opacities = {{map->GetRange()[0], 0.0}, {map->GetRange()[1], 1.0}};
     return function;
   }
-  for (const Place& place : placesOf(OpacityCurve(opacity)))
-    function.opacities.push_back({place.x, std::clamp(place.value.x, 0.0, 1.0)});
+  for (const Knot& knot : knotsOf(OpacityCurve(opacity)))
+    function.opacities.push_back({knot.x, std::clamp(knot.value.x, 0.0, 1.0)});
   return function;
 }
 
