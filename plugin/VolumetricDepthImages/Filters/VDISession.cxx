@@ -22,6 +22,11 @@ vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller) {
   return vdi::comm::Communicator::fromMpi(MPI_Comm_c2f(*communicator->GetMPIComm()->GetHandle()));
 }
 
+bool isRoot() {
+  vtkMultiProcessController* controller = vtkMultiProcessController::GetGlobalController();
+  return controller == nullptr || controller->GetLocalProcessId() == 0;
+}
+
 bool onAllRanks(vtkMultiProcessController* controller, bool here) {
   if (controller == nullptr || controller->GetNumberOfProcesses() == 1) return here;
   const int mine = here ? 1 : 0;

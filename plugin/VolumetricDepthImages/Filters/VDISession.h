@@ -16,6 +16,9 @@ namespace pv {
 /// alone if the controller has none, or one process.
 vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller);
 
+/// Whether this process is the first of the global controller's.
+bool isRoot();
+
 /// Collective: whether `here` is true on all ranks of the controller. Null means this rank alone.
 bool onAllRanks(vtkMultiProcessController* controller, bool here);
 

@@ -3,7 +3,6 @@
 #include <vtkImageData.h>
 #include <vtkInformation.h>
 #include <vtkInformationVector.h>
-#include <vtkMultiProcessController.h>
 #include <vtkObjectFactory.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
 
@@ -15,6 +14,7 @@
 #include "VDIFileState.h"
 #include "VDIImageData.h"
 #include "VDIRetire.h"
+#include "VDISession.h"
 #include "VDIValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
@@ -22,15 +22,6 @@
 #include "vtkVDIImageData.h"
 
 vtkStandardNewMacro(vtkVDIReader);
-
-namespace {
-
-bool isRoot() {
-  vtkMultiProcessController* controller = vtkMultiProcessController::GetGlobalController();
-  return controller == nullptr || controller->GetLocalProcessId() == 0;
-}
-
-}  // namespace
 
 struct vtkVDIReader::Contents {
   vdi::Vdi Vdi;
@@ -50,7 +41,7 @@ vtkVDIReader::vtkVDIReader() {
 }
 
 void vtkVDIReader::Prefetch(const std::string& name) {
-  if (!isRoot() || (this->Next && this->Next->Name == name)) return;
+  if (!pv::isRoot() || (this->Next && this->Next->Name == name)) return;
   if (this->Next) pv::retire(std::move(this->Next));
   this->Next = std::make_unique<Ahead>();
   this->Next->Name = name;
@@ -111,7 +102,7 @@ int vtkVDIReader::RequestInformation(vtkInformation*, vtkInformationVector**, vt
     const auto found = this->Series.find(this->FileName);
     if (found != this->Series.end()) announced = found->second;
   }
-  if (!announced && isRoot()) {
+  if (!announced && pv::isRoot()) {
     try {
       if (this->FileName == nullptr) throw vdi::Error(vdi::ErrorCode::Io, "no file name was given");
       const vdi::Vdi header = vdi::io::readVdiInfo(this->FileName).header;
@@ -126,7 +117,7 @@ int vtkVDIReader::RequestInformation(vtkInformation*, vtkInformationVector**, vt
     info->Set(vtkStreamingDemandDrivenPipeline::TIME_STEPS(), range, 1);
     info->Set(vtkStreamingDemandDrivenPipeline::TIME_RANGE(), range, 2);
   }
-  if (isRoot()) {
+  if (pv::isRoot()) {
     extent[1] = announced->Width - 1;
     extent[3] = announced->Height - 1;
     extent[5] = 0;
@@ -138,7 +129,7 @@ int vtkVDIReader::RequestInformation(vtkInformation*, vtkInformationVector**, vt
 int vtkVDIReader::RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) {
   vtkImageData* output = vtkImageData::GetData(outputs);
   output->Initialize();
-  if (!isRoot()) return 1;
+  if (!pv::isRoot()) return 1;
   try {
     const Contents contents = this->Read();
     pv::setVdi(output, contents.Vdi, contents.Flat);

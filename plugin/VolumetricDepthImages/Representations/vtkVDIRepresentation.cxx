@@ -34,11 +34,6 @@ vtkStandardNewMacro(vtkVDIRepresentation);
 
 namespace {
 
-bool isRoot() {
-  vtkMultiProcessController* controller = vtkMultiProcessController::GetGlobalController();
-  return controller == nullptr || controller->GetLocalProcessId() == 0;
-}
-
 /// Whether there are a client and a server. Both can draw, and both get the same answer.
 bool hasServer() {
   if (pv::isServer()) return true;
@@ -148,7 +143,7 @@ int vtkVDIRepresentation::FillInputPortInformation(int, vtkInformation* info) {
 int vtkVDIRepresentation::RequestData(vtkInformation* request, vtkInformationVector** inputs,
                                       vtkInformationVector* outputs) {
   const bool hasInput = inputs[0]->GetNumberOfInformationObjects() > 0;
-  if (hasInput && isRoot()) {
+  if (hasInput && pv::isRoot()) {
     vtkDataObject* input = vtkDataObject::GetData(inputs[0]);
     vtkAbstractArray* offsets = offsetsOf(input);
     this->HasPacked = true;
@@ -177,7 +172,7 @@ int vtkVDIRepresentation::ProcessViewRequest(vtkInformationRequestKey* request, 
     if (!this->Superclass::ProcessViewRequest(request, in, out)) return 0;
   }
   auto* view = vtkPVRenderView::SafeDownCast(in->Get(vtkPVView::VIEW()));
-  if (updates && !this->HasPacked && isRoot() && view != nullptr && !view->IsCached(this)) {
+  if (updates && !this->HasPacked && pv::isRoot() && view != nullptr && !view->IsCached(this)) {
     // The input's update has failed. Its earlier data aren't the requested ones.
     pv::packProblem(pv::failedUpstream, this->Piece);
     this->PackedOf = nullptr;
