@@ -604,6 +604,17 @@ std::optional<std::string> attributeOf(const std::string& element, const std::st
 
 }  // namespace
 
+TEST_CASE("the filter's numbers of the last VDI have room for each setting") {
+  std::ifstream file(VDI_FILTER_XML);
+  const std::string xml{std::istreambuf_iterator<char>(file), {}};
+  const std::size_t begin = xml.find("VectorProperty name=\"LastVdi\"");
+  REQUIRE(begin != std::string::npos);
+  const std::string property = xml.substr(begin, xml.find('>', begin) - begin);
+  CHECK(std::stoul(attributeOf(property, "number_of_elements").value()) == settingCount + 6);
+  const std::string defaults = attributeOf(property, "default_values").value();
+  CHECK(std::ranges::count(defaults, '0') == settingCount + 6);
+}
+
 TEST_CASE("the filter's properties have the ranges, names and defaults of the table of settings") {
   std::ifstream file(VDI_FILTER_XML);
   std::string xml{std::istreambuf_iterator<char>(file), {}};

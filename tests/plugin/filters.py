@@ -48,7 +48,8 @@ check("generate" in image.SMProxy.GetProperty("Report").GetElement(0), "the repo
 def last_vdi(proxy):
     """The figures on which the panel's estimate is based."""
     proxy.SMProxy.UpdatePropertyInformation()
-    return [proxy.SMProxy.GetProperty("LastVdi").GetElement(i) for i in range(17)]
+    numbers = proxy.SMProxy.GetProperty("LastVdi")
+    return [numbers.GetElement(i) for i in range(numbers.GetNumberOfElements())]
 
 
 # The figures on which the panel's estimate is based.
@@ -68,7 +69,7 @@ check(growth >= 4 and abs(larger[14] / last[14] / growth - 1) < 0.1,
       "supersegments grow with lists: {:.2f} times as many in {:.2f}".format(larger[14] / last[14], growth))
 image.Resolution, image.Margin, image.Precision = [120, 90], 0, 1
 image.UpdatePipeline()
-check(last_vdi(simple.VolumetricDepthImage(Input=wavelet)) == [0] * 17, "without a VDI there is nothing to go by")
+check(last_vdi(simple.VolumetricDepthImage(Input=wavelet)) == [0] * len(last), "without a VDI there is nothing to go by")
 
 # Saved, read again, rendered: the same.
 path = os.path.join(OUTPUT, "wavelet.vdi")

@@ -9,6 +9,8 @@
 
 #include <string_view>
 
+#include "vdi/core/Error.h"
+
 namespace pv {
 
 namespace {
@@ -22,6 +24,24 @@ void sayOthers(vtkObject*, unsigned long, void*, void* said) {
 }
 
 }  // namespace
+
+std::string whatOf(const std::exception_ptr& failure) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const std::exception& error) {
+    return error.what();
+  }
+}
+
+bool isCancellation(const std::exception_ptr& failure) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const vdi::Error& error) {
+    return error.code() == vdi::ErrorCode::Cancelled;
+  } catch (const std::exception&) {
+    return false;
+  }
+}
 
 bool Failure::isNew(vtkAlgorithm* filter, const std::string& text) {
   if (vtkExecutive* executive = filter->GetExecutive(); executive != quiet_) {

@@ -1,16 +1,21 @@
-// A filter's failure, reported once. Views and pipelines repeat their requests to a filter that fails, and
-// VTK's executive adds each time that the algorithm has returned failure.
+// A filter's failure, and its report, once. Views and pipelines repeat their requests to a filter that fails,
+// and VTK's executive adds each time that the algorithm has returned failure.
 #ifndef VDIFailure_h
 #define VDIFailure_h
 
 #include <vtkWeakPointer.h>
 
+#include <exception>
 #include <string>
 
 class vtkAlgorithm;
 class vtkExecutive;
 
 namespace pv {
+
+std::string whatOf(const std::exception_ptr& failure);
+/// Whether the failure is a vdi::Error{Cancelled}.
+bool isCancellation(const std::exception_ptr& failure);
 
 class Failure {
  public:

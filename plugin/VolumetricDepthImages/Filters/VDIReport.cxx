@@ -10,6 +10,8 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "vdi/pipeline/VdiGenerator.h"
+
 namespace pv {
 
 namespace {
@@ -21,13 +23,18 @@ void invoke(unsigned long event, void* data) {
 
 }  // namespace
 
-std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::string& device) {
-  if (reports.empty()) return {};
+FrameReports reportsOf(const vdi::VdiGenerator& generator) {
+  return {.ranks = generator.reports(), .device = generator.device().name()};
+}
+
+std::string textOf(const FrameReports& reports) {
+  const std::vector<vdi::RankReport>& ranks = reports.ranks;
+  if (ranks.empty()) return {};
   std::string text =
       "rank  blocks  volume MiB  upload s  generate s  distribute s  composite s  gather s  sent MiB  device "
       "MiB\n";
-  for (std::size_t i = 0; i < reports.size(); ++i) {
-    const vdi::RankReport& r = reports[i];
+  for (std::size_t i = 0; i < ranks.size(); ++i) {
+    const vdi::RankReport& r = ranks[i];
     constexpr double mib = 1024.0 * 1024.0;
     text += fmt::format(
         "{:4}  {:6}  {:10.1f}  {:8.3f}  {:10.3f}  {:12.3f}  {:11.3f}  {:8.3f}  {:8.2f}  {:10.1f}\n", i,
@@ -35,8 +42,8 @@ std::string reportOf(const std::vector<vdi::RankReport>& reports, const std::str
         r.distributeSeconds, r.compositeSeconds, r.gatherSeconds, static_cast<double>(r.bytesSent) / mib,
         static_cast<double>(r.deviceBytes) / mib);
   }
-  text += fmt::format("samples per voxel: {:g}\n", reports.front().samplesPerVoxel);
-  return text + "device of rank 0: " + device + "\n";
+  text += fmt::format("samples per voxel: {:g}\n", ranks.front().samplesPerVoxel);
+  return text + "device of rank 0: " + reports.device + "\n";
 }
 
 std::optional<vdi::MadeVdi> madeVdiOf(vtkImageData* image, const vdi::GenerateSettings& settings,

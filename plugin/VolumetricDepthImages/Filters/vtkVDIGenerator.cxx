@@ -1,9 +1,5 @@
 #include "vtkVDIGenerator.h"
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>  // fmt::join
-#include <vtkCompositeDataSet.h>
-#include <vtkDataArray.h>
 #include <vtkDataObject.h>
 #include <vtkDataSetAttributes.h>
 #include <vtkFieldData.h>
@@ -12,96 +8,68 @@
 #include <vtkInformationVector.h>
 #include <vtkMultiProcessController.h>
 #include <vtkObjectFactory.h>
-#include <vtkPiecewiseFunction.h>
 #include <vtkPointData.h>
 #include <vtkScalarsToColors.h>
 #include <vtkStreamingDemandDrivenPipeline.h>
 
-#include <algorithm>
 #include <array>
 #include <chrono>
-#include <cstring>
 #include <exception>
+#include <functional>
 #include <new>
 #include <optional>
 #include <string>
 #include <utility>
-#include <vector>
 
-#include "VDIBlocks.h"
+#include "VDIDefaultRange.h"
 #include "VDIFailure.h"
+#include "VDIFrameInputs.h"
 #include "VDIImageData.h"
+#include "VDIInput.h"
 #include "VDILastVdi.h"
 #include "VDILoad.h"
+#include "VDIMaker.h"
+#include "VDIOutput.h"
 #include "VDIPlace.h"
 #include "VDIPreparation.h"
 #include "VDIRegeneration.h"
 #include "VDIReport.h"
 #include "VDIRetire.h"
 #include "VDISession.h"
-#include "VDITransferFunctions.h"
 #include "VDIValues.h"
 #include "VDIVolume.h"
+#include "VDIVolumeUse.h"
 #include "vdi/core/Blending.h"
 #include "vdi/core/Error.h"
-#include "vdi/core/SettingsTable.h"
-#include "vdi/core/UnitDistance.h"
 #include "vdi/pipeline/VdiGenerator.h"
 #include "vtkVDIImageData.h"
 
 vtkStandardNewMacro(vtkVDIGenerator);
 
-/// The inputs of a frame besides the volume: its viewpoint, colours and settings.
-struct vtkVDIGenerator::FrameInputs {
-  vdi::Camera Camera;
-  vdi::TransferFunction Function;
-  vdi::GenerateSettings Settings;
-};
-
 struct vtkVDIGenerator::Internals {
-  std::shared_ptr<pv::Volumes> Volumes = pv::sharedVolumes();
-  std::shared_ptr<pv::Volume> Volume;  // null before the first update; other filters may share it
-  std::uint64_t Identity = 0;          // the filter's, from its first volume on; the same on all ranks
-  /// Reports of the last VDI or picture. A preparation's thread writes them until it ends.
-  std::vector<vdi::RankReport> Reports;
-  std::string Device;
-  pv::Failure Said;
-  /// The range of the default map. It stays that of the first frame while the array stays the same, so that
-  /// films don't flicker.
-  std::optional<vdi::ScalarRange> FirstRange;
-  pv::ArrayChoice FirstChoice;
-  pv::Regeneration Regeneration;  // last member, because its thread uses the others
+  explicit Internals(std::function<bool(const pv::Origin&)> wants) : Use(std::move(wants)) {}
 
-  /// Call it before each frame with the frame's array.
-  void NoteChoice(const pv::ArrayChoice& choice) {
-    if (this->FirstRange && !(this->FirstChoice == choice)) this->FirstRange.reset();
-    this->FirstChoice = choice;
-  }
-  /// The shown blocks if the volume shows this origin and no later turn changes it; else null.
-  std::shared_ptr<const pv::Shown> ShownOf(const pv::Origin& origin) const {
-    if (!this->Volume || !this->Volume->targets(origin)) return nullptr;
-    std::shared_ptr<const pv::Shown> shown = this->Volume->shown();
-    return shown && shown->of == origin ? shown : nullptr;
-  }
-  void TakeReports(const vdi::VdiGenerator& generator) {
-    this->Reports = generator.reports();
-    this->Device = generator.device().name();
-  }
-  pv::Preparation::Make Maker(FrameInputs frame, std::optional<pv::Load> load, const pv::Origin& origin,
-                              int step);
+  pv::VolumeUse Use;
+  /// Reports of the last VDI or picture. A preparation's thread writes them until it ends.
+  pv::FrameReports Reports;
+  pv::LastVdiNumbers Last{};
+  pv::Failure Said;
+  pv::DefaultRange Range;
+  pv::Regeneration Regeneration;  // last member, because its thread uses the others
 };
 
 vtkVDIGenerator::vtkVDIGenerator()
-    : Internal(new Internals), Controller(vtkMultiProcessController::GetGlobalController()) {
+    : Internal(new Internals([this](const pv::Origin& origin) {
+        return this->GetNumberOfInputConnections(0) > 0 &&
+               this->OriginOf(this->GetInputDataObject(0, 0)) == origin;
+      })),
+      Controller(vtkMultiProcessController::GetGlobalController()) {
   this->SetInputArrayToProcess(0, 0, 0, vtkDataObject::FIELD_ASSOCIATION_POINTS,
                                vtkDataSetAttributes::SCALARS);
-  for (const vdi::Setting& setting : vdi::settingsTable())
-    this->Settings.push_back(setting.get({.samplesPerVoxel = vdi::automaticRate}));
 }
 
 vtkVDIGenerator::~vtkVDIGenerator() {
-  this->SetReport(nullptr);
-  if (this->Internal->Volume) this->Internal->Volume->leave(this);
+  this->Internal->Use.leave();
   // The destructor joins the thread only when other ranks take part.
   pv::Regeneration& regeneration = this->Internal->Regeneration;
   if (regeneration.giveUp() && !regeneration.preparesOnRanks()) pv::retire(std::move(this->Internal));
@@ -111,124 +79,21 @@ bool vtkVDIGenerator::IsRoot() const {
   return this->Controller == nullptr || this->Controller->GetLocalProcessId() == 0;
 }
 
-void vtkVDIGenerator::SetReport(const char* text) {
-  delete[] this->Report;
-  this->Report = nullptr;
-  if (text == nullptr) return;
-  const std::size_t bytes = std::strlen(text) + 1;
-  this->Report = new char[bytes];
-  std::memcpy(this->Report, text, bytes);
-}
-
-void vtkVDIGenerator::PrintSelf(ostream& os, vtkIndent indent) {
-  this->Superclass::PrintSelf(os, indent);
-  os << indent << "Resolution: " << this->Resolution[0] << " x " << this->Resolution[1] << "\n";
-  for (std::size_t i = 0; i < this->Settings.size(); ++i) {
-    const vdi::Setting& setting = vdi::settingsTable()[i];
-    os << indent << setting.property << ": " << this->Settings[i] << "\n";
-  }
-  os << indent << "Lights: " << this->Lights.size() << "\n"
-     << indent << "Cropping: " << this->Cropping << "\n"
-     << indent << "CroppingBox: " << fmt::format("{}", fmt::join(this->CroppingBox, " ")) << "\n"
-     << indent << "ClippingPlanes: " << this->ClippingPlanes.size() << "\n"
-     << indent << "BlendMode: " << this->BlendMode << "\n"
-     << indent << "IsosurfaceValues: " << fmt::format("{}", fmt::join(this->IsosurfaceValues, " ")) << "\n"
-     << indent << "ScalarOpacityUnitDistance: " << this->ScalarOpacityUnitDistance << "\n";
-}
-
-void vtkVDIGenerator::SetLookupTable(vtkScalarsToColors* table) {
-  if (this->LookupTable == table) return;
-  this->LookupTable = table;
-  this->Modified();
-}
-
-void vtkVDIGenerator::SetScalarOpacityFunction(vtkPiecewiseFunction* function) {
-  if (this->ScalarOpacityFunction == function) return;
-  this->ScalarOpacityFunction = function;
-  this->Modified();
-}
-
-void vtkVDIGenerator::AddLight(double right, double up, double back, double red, double green, double blue) {
-  this->Lights.push_back({right, up, back, red, green, blue});
-  this->Modified();
-}
-
-void vtkVDIGenerator::RemoveAllLights() {
-  if (this->Lights.empty()) return;
-  this->Lights.clear();
-  this->Modified();
-}
-
-void vtkVDIGenerator::AddClippingPlane(double originX, double originY, double originZ, double normalX,
-                                       double normalY, double normalZ) {
-  this->ClippingPlanes.push_back({originX, originY, originZ, normalX, normalY, normalZ});
-  this->Modified();
-}
-
-void vtkVDIGenerator::RemoveAllClippingPlanes() {
-  if (this->ClippingPlanes.empty()) return;
-  this->ClippingPlanes.clear();
-  this->Modified();
-}
-
-void vtkVDIGenerator::AddIsosurfaceValue(double value) {
-  this->IsosurfaceValues.push_back(value);
-  this->Modified();
-}
-
-void vtkVDIGenerator::RemoveAllIsosurfaceValues() {
-  if (this->IsosurfaceValues.empty()) return;
-  this->IsosurfaceValues.clear();
-  this->Modified();
-}
-
-/// Throws vdi::Error if a VDI can't hold this blending.
-vdi::Blending vtkVDIGenerator::CurrentBlending() const {
-  vdi::Blending blending;
-  blending.mode = static_cast<vdi::BlendMode>(this->BlendMode);
-  if (blending.mode == vdi::BlendMode::Isosurface) blending.isovalues = this->IsosurfaceValues;
-  if (blending.mode != vdi::BlendMode::Composite && !this->PictureOnly)
-    throw vdi::Error(vdi::ErrorCode::InvalidArgument,
-                     "a VDI holds only composite blending. Choose Composite as Blend Mode, or Picture Only "
-                     "(PictureOnly, an advanced property) for a picture of this mode without a VDI");
-  return blending;
-}
-
-vdi::Region vtkVDIGenerator::CurrentRegion() const {
-  vdi::Region region;
-  const double* b = this->CroppingBox;
-  const bool isSet = std::any_of(b, b + 6, [](double bound) { return bound != 0.0; });
-  if (this->Cropping && isSet) region.box = {{b[0], b[2], b[4]}, {b[1], b[3], b[5]}};
-  for (const std::array<double, 6>& plane : this->ClippingPlanes)
-    region.planes.push_back({{plane[0], plane[1], plane[2]}, {plane[3], plane[4], plane[5]}});
-  return region;
-}
-
-void vtkVDIGenerator::SetSetting(const char* property, double value) {
-  double& setting = this->Settings[vdi::indexOfSetting(property)];
-  if (setting == value) return;
-  setting = value;
-  this->Modified();
+double* vtkVDIGenerator::GetLastVdi() {
+  static_assert(std::tuple_size_v<pv::LastVdiNumbers> == 17, "the header's size hint is another number");
+  return this->Internal->Last.data();
 }
 
 void vtkVDIGenerator::SetController(vtkMultiProcessController* controller) {
   if (this->Controller == controller) return;
   this->Internal->Regeneration.drop();
-  this->UseVolume(nullptr);
-  this->Internal->Identity = 0;
+  this->Internal->Use.startAnew();
   this->Controller = controller;
   this->Modified();
 }
 
 vtkMTimeType vtkVDIGenerator::GetMTime() {
   return this->Internal->Regeneration.time(this->CurrentMTime(), this->ServesView());
-}
-
-vtkMTimeType vtkVDIGenerator::CurrentMTime() {
-  vtkMTimeType time = this->Superclass::GetMTime();
-  if (this->LookupTable) time = std::max(time, this->LookupTable->GetMTime());
-  if (this->ScalarOpacityFunction) time = std::max(time, this->ScalarOpacityFunction->GetMTime());
-  return time;
 }
 
 int vtkVDIGenerator::FillInputPortInformation(int, vtkInformation* info) {
@@ -258,90 +123,16 @@ int vtkVDIGenerator::RequestInformation(vtkInformation*, vtkInformationVector**,
 
 int vtkVDIGenerator::RequestUpdateExtent(vtkInformation*, vtkInformationVector** inputs,
                                          vtkInformationVector*) {
-  using Pipeline = vtkStreamingDemandDrivenPipeline;
-  vtkInformation* info = inputs[0]->GetInformationObject(0);
-  const int rank = this->Controller ? this->Controller->GetLocalProcessId() : 0;
-  const int ranks = this->Controller ? this->Controller->GetNumberOfProcesses() : 1;
-  // Cell data need a neighbour's cells to interpolate up to the common face. Both blocks have the points on
-  // that face.
-  int association = vtkDataObject::FIELD_ASSOCIATION_POINTS;
-  if (vtkInformation* array = this->GetInputArrayInformation(0)) {
-    if (array->Has(vtkDataObject::FIELD_ASSOCIATION()))
-      association = array->Get(vtkDataObject::FIELD_ASSOCIATION());
-  }
-  const int ghosts = ranks > 1 && association == vtkDataObject::FIELD_ASSOCIATION_CELLS ? 1 : 0;
-  info->Set(Pipeline::UPDATE_PIECE_NUMBER(), rank);
-  info->Set(Pipeline::UPDATE_NUMBER_OF_PIECES(), ranks);
-  info->Set(Pipeline::UPDATE_NUMBER_OF_GHOST_LEVELS(), ghosts);
-  // Asks for the whole extent. The source splits it and makes this rank's piece of it.
-  if (info->Has(Pipeline::WHOLE_EXTENT())) {
-    int whole[6];
-    info->Get(Pipeline::WHOLE_EXTENT(), whole);
-    info->Set(Pipeline::UPDATE_EXTENT(), whole, 6);
-  } else {
-    info->Remove(Pipeline::UPDATE_EXTENT());  // the picture's, which composite sources would get
-  }
+  pv::requestPiece(inputs[0]->GetInformationObject(0), this, this->Controller);
   return 1;
 }
 
 namespace {
 
-/// Computes the ranges that ParaView asks for after an update. The arrays store them. It takes half a second
-/// for a large VDI.
-void findRanges(vtkFieldData* fields) {
-  for (int i = 0; i < fields->GetNumberOfArrays(); ++i) {
-    vtkDataArray* array = fields->GetArray(i);
-    if (array == nullptr) continue;
-    const int components = array->GetNumberOfComponents();
-    for (int component = components > 1 ? -1 : 0; component < components; ++component) {
-      double range[2];
-      array->GetRange(range, component);
-      array->GetFiniteRange(range, component);
-    }
-  }
-}
-
-/// Sets the output's time to the input's, or removes it.
-void setTime(vtkImageData* output, std::optional<double> time) {
-  if (time) {
-    output->GetInformation()->Set(vtkDataObject::DATA_TIME_STEP(), *time);
-  } else {
-    output->GetInformation()->Remove(vtkDataObject::DATA_TIME_STEP());
-  }
-}
-
 vdi::Image nothingOf(int width, int height) {
   vdi::Image nothing{.width = width, .height = height, .rgba = {}, .depth = {}};
   nothing.rgba.resize(nothing.pixelCount());
   return nothing;
-}
-
-/// Completes the VDI with the facts about its blocks, and moves it to the output.
-void giveVdi(vdi::Vdi& vdi, const pv::Shown& shown, const pv::Origin& origin, int step,
-             vtkImageData* output) {
-  vdi.coloring->array = shown.array;
-  vdi.time = origin.time.value_or(0.0);
-  vdi.timeStep = static_cast<std::uint64_t>(std::max(step, 0));
-  pv::setVdi(output, vdi);
-  pv::setShownValues(output, shown.array, shown.values);
-}
-
-std::string whatOf(const std::exception_ptr& failure) {
-  try {
-    std::rethrow_exception(failure);
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-}
-
-bool isCancellation(const std::exception_ptr& failure) {
-  try {
-    std::rethrow_exception(failure);
-  } catch (const vdi::Error& error) {
-    return error.code() == vdi::ErrorCode::Cancelled;
-  } catch (const std::exception&) {
-    return false;
-  }
 }
 
 }  // namespace
@@ -363,7 +154,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
     this->Enter();
     if (pv::onAllRanks(this->Controller, isMade)) {
       output->ShallowCopy(regeneration.made());
-      setTime(output, origin.time);
+      pv::setTime(output, origin.time);
       regeneration.keep(last);
       regeneration.answer();
       regeneration.giveUpOther(origin);
@@ -380,7 +171,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
     failure = std::current_exception();
   }
   if (failure && this->DropLostDevice()) {
-    vtkWarningMacro(<< whatOf(failure) << "; trying a new device");
+    vtkWarningMacro(<< pv::whatOf(failure) << "; trying a new device");
     failure = nullptr;
     try {
       output->Initialize();
@@ -393,25 +184,25 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   }
   if (failure) return this->EndWithout(failure, output);
   this->Internal->Said.isOver();
-  if (const auto made = pv::madeVdiOf(output, this->CurrentSettings(), this->Internal->Reports))
-    std::ranges::copy(pv::numbersOf(*made), this->LastVdi);
+  if (const auto made = pv::madeVdiOf(output, this->CurrentSettings(), this->Internal->Reports.ranks))
+    this->Internal->Last = pv::numbersOf(*made);
   regeneration.finish(output, origin, this->CurrentMTime());  // the time has grown: a map has built its table
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - start;
-  pv::noteFrame({static_cast<vtkObjectBase*>(this), spent.count(), this->Internal->Reports});
+  pv::noteFrame({static_cast<vtkObjectBase*>(this), spent.count(), this->Internal->Reports.ranks});
   return 1;
 }
 
 /// Ends a request without a VDI, and returns RequestData's result.
 int vtkVDIGenerator::EndWithout(const std::exception_ptr& failure, vtkImageData* output) {
   output->Initialize();
-  if (isCancellation(failure)) {
+  if (pv::isCancellation(failure)) {
     // Like ParaView's own filters, this one doesn't try again until something changes.
     this->Internal->Regeneration.cancel();
     this->SetAbortOutput(false);  // or the executive empties the output
     this->KeepEarlier(output);
     return 1;
   }
-  this->SayFailure(whatOf(failure));
+  this->SayFailure(pv::whatOf(failure));
   return 0;
 }
 
@@ -422,18 +213,11 @@ void vtkVDIGenerator::SayFailure(const std::string& what) {
 }
 
 /// If a rank has lost its device, gives up the volume, so that the next one gets another device, and returns
-/// true. Collective: with a generator, all ranks fail together, whatever the cause on each.
+/// true. Collective.
 bool vtkVDIGenerator::DropLostDevice() {
-  const std::shared_ptr<pv::Volume> volume = this->Internal->Volume;
-  if (!volume || !volume->isMade()) return false;
-  {
-    pv::Turn turn(*volume);
-    turn.await();
-    const vdi::VdiGenerator& generator = volume->generator();
-    if (!generator.communicator().anyTogether([&] { return generator.device().isLost(); })) return false;
-  }
+  if (!this->Internal->Use.hasLostDevice()) return false;
   this->Internal->Regeneration.drop();
-  this->UseVolume(nullptr);
+  this->Internal->Use.giveUp();
   return true;
 }
 
@@ -494,7 +278,7 @@ bool vtkVDIGenerator::Defer(vtkDataObject* input, const pv::Origin& origin, bool
   bool isGiven = true;
   try {
     this->GiveEarlier(output);
-    setTime(output, origin.time);
+    pv::setTime(output, origin.time);
   } catch (const std::bad_alloc&) {
     isGiven = false;
   }
@@ -560,49 +344,13 @@ void vtkVDIGenerator::AnnounceRange(const char* array, int components, int compo
 }
 
 pv::Origin vtkVDIGenerator::OriginOf(vtkDataObject* input) {
-  pv::Origin origin;
-  if (vtkInformation* array = this->GetInputArrayInformation(0)) {
-    if (array->Has(vtkDataObject::FIELD_NAME())) origin.choice.name = array->Get(vtkDataObject::FIELD_NAME());
-    if (array->Has(vtkDataObject::FIELD_ASSOCIATION())) {
-      origin.choice.cells =
-          array->Get(vtkDataObject::FIELD_ASSOCIATION()) == vtkDataObject::FIELD_ASSOCIATION_CELLS;
-    }
-  }
-  origin.choice.component = this->Component;
-  origin.fillGhosts = this->FillGhosts;
-  if (input != nullptr) {
-    if (input->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP()))
-      origin.time = input->GetInformation()->Get(vtkDataObject::DATA_TIME_STEP());
-    origin.input = pv::identityOf(input);
-  }
-  if (auto* upstream = vtkDemandDrivenPipeline::SafeDownCast(this->GetInputExecutive(0, 0)))
-    origin.upstream = upstream->GetPipelineMTime();
-  return origin;
-}
-
-void vtkVDIGenerator::UseVolume(const std::shared_ptr<pv::Volume>& volume) {
-  std::shared_ptr<pv::Volume>& own = this->Internal->Volume;
-  if (own == volume) return;
-  if (own) own->leave(this);
-  own = volume;
-  if (!own) return;
-  own->join(this, [this](const pv::Origin& origin) {
-    return this->GetNumberOfInputConnections(0) > 0 &&
-           this->OriginOf(this->GetInputDataObject(0, 0)) == origin;
-  });
-}
-
-/// Uses the volume in which another filter shows this input, or a volume that can show it. Collective.
-void vtkVDIGenerator::ChooseVolume(const pv::Origin& origin) {
-  Internals& internal = *this->Internal;
-  if (internal.Identity == 0) internal.Identity = pv::newIdentity(this->Controller);
-  this->UseVolume(internal.Volumes->choose(this->Controller, origin, internal.Volume, this));
+  return pv::originOf(input, this, this->Component, this->FillGhosts);
 }
 
 /// Shows the input in the volume. The filter must have its turn. Uploads nothing if another filter has done
 /// so, or if only the camera or the transfer function has changed. Collective.
 void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const pv::Origin& origin) {
-  pv::Volume& volume = *this->Internal->Volume;
+  pv::Volume& volume = *this->Internal->Use.volume();
   const vdi::comm::Communicator& comm = volume.generator().communicator();
   comm.together([&] { pv::requireInput(input); });
   // The ranks' next steps depend on these values. The generator compares the others.
@@ -614,7 +362,7 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const pv::Origin& origin)
   comm.requireEqual(static_cast<std::uint64_t>(this->BlendMode), "BlendMode");
   // Rejects the blend mode before any values are loaded.
   comm.together([&] { static_cast<void>(this->CurrentBlending()); });
-  if (!comm.anyTogether([&] { return this->Internal->ShownOf(origin) == nullptr; })) return;
+  if (!comm.anyTogether([&] { return this->Internal->Use.shownOf(origin) == nullptr; })) return;
   pv::Load load;
   comm.together([&] { load = pv::loadOf(input, this->GetInputAlgorithm(0, 0), origin); });
   pv::complete(load, input, this->Controller);
@@ -623,78 +371,17 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const pv::Origin& origin)
   volume.show(load);
 }
 
-vdi::ScalarRange vtkVDIGenerator::StandInRange(const pv::Shown& shown) {
-  Internals& internal = *this->Internal;
-  internal.NoteChoice(shown.of.choice);
-  if (internal.FirstRange) return *internal.FirstRange;
-  const vdi::ScalarRange range = shown.range;
-  if (range.min < range.max) return *(internal.FirstRange = range);
-  // Without values, or with one value everywhere, there is no range to keep.
-  const double low = range.min <= range.max ? range.min : 0.0;
-  return {low, low + 1.0};
-}
-
-vdi::Camera vtkVDIGenerator::Viewpoint(const vdi::Box& bounds) const {
-  const auto vector = [](const double* v) { return glm::dvec3(v[0], v[1], v[2]); };
-  vdi::Camera camera{vector(this->CameraPosition), vector(this->CameraFocalPoint), vector(this->CameraViewUp),
-                     this->CameraViewAngle,        this->CameraParallelProjection, this->CameraParallelScale};
-  // vdi::View reports an unusable angle later.
-  const bool usable = this->CameraViewAngle > 0.0 && this->CameraViewAngle < 180.0;
-  if (camera.position != camera.focalPoint || !usable) return camera;
-  camera = vdi::Camera::framing(bounds, {0.0, 0.0, -1.0}, camera.viewUp, camera.viewAngle);
-  camera.parallelProjection = this->CameraParallelProjection;
-  return camera;
-}
-
 /// Enters an update on all ranks. If the ranks' filters don't belong together, all give up their volumes and
 /// start anew.
 void vtkVDIGenerator::Enter() {
   Internals& internal = *this->Internal;
-  const std::string name =
-      internal.Identity != 0 ? fmt::format("{:x}", internal.Identity) : std::string("a new one");
   try {
-    pv::enterCollective(this->Controller, "VolumetricDepthImage, " + name);
+    pv::enterCollective(this->Controller, internal.Use.name());
   } catch (const vdi::Error&) {
     internal.Regeneration.drop();
-    this->UseVolume(nullptr);
-    internal.Identity = 0;
+    internal.Use.startAnew();
     throw;
   }
-}
-
-std::array<int, 2> vtkVDIGenerator::PictureSize() const {
-  if (this->Resolution[0] == 0 && this->Resolution[1] == 0) return {1280, 720};
-  return {this->Resolution[0], this->Resolution[1]};
-}
-
-/// The frame for blocks in these bounds, with the current properties and maps. `range` is that of the default
-/// map.
-vtkVDIGenerator::FrameInputs vtkVDIGenerator::CurrentFrame(const vdi::Box& bounds, double voxelVolume,
-                                                           const vdi::ScalarRange& range) {
-  double unit = this->ScalarOpacityUnitDistance;
-  if (unit <= 0.0) unit = vdi::unitDistanceOf(bounds, voxelVolume);
-  FrameInputs frame{.Camera = this->Viewpoint(bounds),
-                    .Function = pv::transferFunctionOf(this->LookupTable, this->ScalarOpacityFunction,
-                                                       range.min, range.max, unit),
-                    .Settings = this->CurrentSettings()};
-  return frame;
-}
-
-vdi::GenerateSettings vtkVDIGenerator::CurrentSettings() const {
-  vdi::GenerateSettings settings;
-  const auto [width, height] = this->PictureSize();
-  settings.width = width;
-  settings.height = height;
-  for (std::size_t i = 0; i < this->Settings.size(); ++i)
-    vdi::settingsTable()[i].put(settings, this->Settings[i]);
-  if (!this->Lights.empty()) settings.shading.lights.clear();
-  for (const std::array<double, 6>& light : this->Lights)
-    settings.shading.lights.push_back({{light[0], light[1], light[2]}, {light[3], light[4], light[5]}});
-  settings.region = this->CurrentRegion();
-  settings.blending = this->CurrentBlending();
-  if (this->PictureOnly)
-    settings.terminationOpacity = std::min(settings.terminationOpacity, vdi::pictureTermination);
-  return settings;
 }
 
 void vtkVDIGenerator::Hold() {
@@ -723,38 +410,14 @@ void vtkVDIGenerator::ServePreparation() {
   this->Internal->Regeneration.serve(most);
 }
 
-/// Returns the function that a preparation's thread runs. `load` has the blocks of `origin` if the volume
-/// doesn't show them yet.
-pv::Preparation::Make vtkVDIGenerator::Internals::Maker(FrameInputs frame, std::optional<pv::Load> load,
-                                                        const pv::Origin& origin, int step) {
-  return [this, frame = std::move(frame), load = std::move(load), origin, step](
-             pv::Volume& volume, const vdi::Progress& progress, vtkVDIImageData* output) {
-    volume.make();  // does nothing on several ranks, because AskedFrame has done it
-    if (load) {
-      volume.show(*load);
-    } else {
-      volume.requireShown(origin);
-    }
-    this->Reports.clear();
-    vdi::VdiGenerator& generator = volume.generator();
-    std::optional<vdi::Vdi> vdi = generator.generate(frame.Camera, frame.Function, frame.Settings, progress);
-    this->TakeReports(generator);
-    if (!vdi) return;  // another rank has it
-    giveVdi(*vdi, *volume.shown(), origin, step, output);
-    findRanges(output->GetPointData());
-    findRanges(output->GetFieldData());
-    if (pv::isServer()) output->SetFile(pv::fileOf(*vdi));
-  };
-}
-
 void vtkVDIGenerator::Prepare() {
   Internals& internal = *this->Internal;
   pv::Regeneration& regeneration = internal.Regeneration;
   regeneration.drop();
   const std::optional<pv::ViewRequest>& asked = regeneration.asked();
-  const auto shown = regeneration.madeOf() ? internal.ShownOf(*regeneration.madeOf()) : nullptr;
+  const auto shown = regeneration.madeOf() ? internal.Use.shownOf(*regeneration.madeOf()) : nullptr;
   bool can = !regeneration.isCurrent(this->CurrentMTime()) && (asked || shown) && !this->PictureOnly;
-  FrameInputs frame;
+  pv::FrameInputs frame;
   if (pv::onAllRanks(this->Controller, can)) {
     try {
       frame = asked ? this->AskedFrame() : this->ShownFrame(*shown);
@@ -771,23 +434,24 @@ void vtkVDIGenerator::Prepare() {
   std::optional<pv::Load> load;  // blocks that the volume doesn't show yet
   if (asked) load = asked->load;
   const pv::Origin origin = load ? load->of : *regeneration.madeOf();
-  if (load) internal.Volume->setTarget(origin);
-  regeneration.prepare(internal.Volume, origin, this->CurrentMTime(),
-                       internal.Maker(std::move(frame), std::move(load), origin, this->TimeStep));
+  if (load) internal.Use.volume()->setTarget(origin);
+  regeneration.prepare(
+      internal.Use.volume(), origin, this->CurrentMTime(),
+      pv::makerOf(std::move(frame), std::move(load), origin, this->TimeStep, internal.Reports));
 }
 
 /// The frame that a view has asked for. Also chooses its volume. Collective.
-vtkVDIGenerator::FrameInputs vtkVDIGenerator::AskedFrame() {
+pv::FrameInputs vtkVDIGenerator::AskedFrame() {
   const pv::ViewRequest& asked = *this->Internal->Regeneration.asked();
-  this->ChooseVolume(asked.load.of);
+  this->Internal->Use.choose(this->Controller, asked.load.of);
   // A thread must not make a communicator of several ranks.
-  if (this->Internal->Volume->hasRanks()) this->Internal->Volume->make();
-  this->Internal->NoteChoice(asked.load.of.choice);
+  if (this->Internal->Use.volume()->hasRanks()) this->Internal->Use.volume()->make();
+  this->Internal->Range.noteChoice(asked.load.of.choice);
   return this->CurrentFrame(asked.bounds, asked.load.voxelVolume, {0.0, 1.0});
 }
 
-vtkVDIGenerator::FrameInputs vtkVDIGenerator::ShownFrame(const pv::Shown& shown) {
-  return this->CurrentFrame(shown.bounds, shown.voxelVolume, this->StandInRange(shown));
+pv::FrameInputs vtkVDIGenerator::ShownFrame(const pv::Shown& shown) {
+  return this->CurrentFrame(shown.bounds, shown.voxelVolume, this->Internal->Range.rangeOf(shown));
 }
 
 /// Ends the use of the volume by this filter's thread. Returns whether the thread has made exactly this
@@ -798,20 +462,20 @@ bool vtkVDIGenerator::TakePreparation(const pv::Origin& origin, vtkImageData* ou
     return !this->CheckAbort();
   };
   if (!this->Internal->Regeneration.take(origin, this->Controller, output, goesOn)) return false;
-  if (output->GetNumberOfPoints() > 0) setTime(output, origin.time);
+  if (output->GetNumberOfPoints() > 0) pv::setTime(output, origin.time);
   this->TakeReport();
   return true;
 }
 
 void vtkVDIGenerator::TakeReport() {
-  this->SetReport(pv::reportOf(this->Internal->Reports, this->Internal->Device).c_str());
+  this->Report = pv::textOf(this->Internal->Reports);
 }
 
 void vtkVDIGenerator::Generate(vtkDataObject* input, const pv::Origin& origin, vtkImageData* output) {
   if (this->TakePreparation(origin, output)) return;
   Internals& internal = *this->Internal;
-  this->ChooseVolume(origin);
-  pv::Volume& volume = *internal.Volume;
+  internal.Use.choose(this->Controller, origin);
+  pv::Volume& volume = *internal.Use.volume();
   pv::Turn turn(volume);
   turn.await();
   volume.make();
@@ -834,13 +498,13 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, const pv::Origin& origin, v
   }
   // Only one rank has the result. If it can't pass that on, all ranks fail.
   generator.communicator().together([&, &from = camera] {
-    internal.TakeReports(generator);
+    internal.Reports = pv::reportsOf(generator);
     this->TakeReport();
     if (picture) {
       pv::setPicture(output, *picture, true);
       pv::setPlace(output->GetFieldData(), from, shown->bounds);
     }
-    if (vdi) giveVdi(*vdi, *shown, origin, this->TimeStep, output);
-    if (vdi || this->PictureOnly) setTime(output, origin.time);
+    if (vdi) pv::giveVdi(*vdi, *shown, origin, this->TimeStep, output);
+    if (vdi || this->PictureOnly) pv::setTime(output, origin.time);
   });
 }
