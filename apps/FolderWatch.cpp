@@ -131,7 +131,7 @@ bool FolderWatch::isKnown(const std::string& name, const FileLook& look) const {
   return known != known_.end() && known->second == look;
 }
 
-/// Compares a file with what is known of it.
+/// Compares a file with its last known properties.
 void FolderWatch::check(const std::string& name, Changes& changes) {
   const std::filesystem::path file = folder_ / name;
   std::error_code error;  // the entry of a file that is gone has no path

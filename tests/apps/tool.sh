@@ -204,7 +204,7 @@ refused 2 "step.*whole" "$vdi" generate --field sphere "${small[@]}" --step 1844
 refused 2 "exceeds" "$vdi" generate --raw s0.json s1.json --step 18446744073709551615 -o x.vdi
 refused 2 "finite" "$vdi" generate --field sphere "${small[@]}" --time nan -o x.vdi
 
-# Each viewpoint that can't show the VDI truly gets one warning.
+# Each viewpoint from which the picture isn't true gets one warning.
 warnings() { grep -c "^vdi: warning: .*$1" err.txt; }
 works "no warning" "$vdi" render one.vdi -o x.png --azimuth -50 0 50
 [ ! -s err.txt ] || { fail "there is a warning of a viewpoint near V_O"; cat err.txt; }

@@ -47,7 +47,7 @@ class Outbox {
   std::uint64_t dropped() const { return dropped_; }
   /// The bytes per second that the viewer takes, estimated from acknowledgements and the limit; 0: unknown.
   double rate() const;
-  /// Whether that many bytes fit between two frames, as far as is known.
+  /// Whether that many bytes fit between two frames, as far as the outbox knows.
   bool isFastEnoughFor(std::uint64_t bytes) const { return fits(bytes, period_); }
   /// Bytes sent and not acknowledged.
   std::uint64_t underWay() const { return underWay_; }
