@@ -103,7 +103,7 @@ enum { VDI_CATALYST_POINTS = 0, VDI_CATALYST_CELLS = 1 };
  * cells of its own. Ghost layers therefore count beyond the domain only, as on periodic or mirrored
  * sides. There, values straight beside a block are read. Those at edges and corners (beyond the
  * block along two or three axes) may be unset: they are never shown, and the values there are
- * continued from the layers' faces. Finite ones still count in an automatic range of colours.
+ * continued from the layers' faces. No ghost value counts in an automatic range of colours.
  *
  * Blocks of different spacing may overlap: the finest is shown. Blocks of equal spacing must not overlap,
  * except by ghost layers announced as such. An overlap by more than a thousandth of a cell is an error that

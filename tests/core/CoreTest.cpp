@@ -89,17 +89,17 @@ TEST_CASE("the range of a block's finite values, wherever they stand") {
       expected.max = std::max(expected.max, static_cast<double>(value));
     }
     const glm::dvec3 one(1.0);
-    CHECK(finiteRange(Block::fromPoints({count, 1, 1}, {}, one, ScalarType::F32, floats.data())) == expected);
+    CHECK(ownRange(Block::fromPoints({count, 1, 1}, {}, one, ScalarType::F32, floats.data())) == expected);
 
     std::vector<std::int8_t> bytes(static_cast<std::size_t>(count));
     for (std::int8_t& value : bytes) value = static_cast<std::int8_t>(generator() % 100 - 50);
     const auto [minimum, maximum] = std::minmax_element(bytes.begin(), bytes.end());
-    CHECK(finiteRange(Block::fromPoints({count, 1, 1}, {}, one, ScalarType::I8, bytes.data())) ==
+    CHECK(ownRange(Block::fromPoints({count, 1, 1}, {}, one, ScalarType::I8, bytes.data())) ==
           ScalarRange{static_cast<double>(*minimum), static_cast<double>(*maximum)});
   }
   const double nothing[] = {std::numeric_limits<double>::infinity(),
                             std::numeric_limits<double>::quiet_NaN()};
-  CHECK(finiteRange(Block::fromPoints({2, 1, 1}, {}, glm::dvec3(1.0), ScalarType::F64, nothing)) ==
+  CHECK(ownRange(Block::fromPoints({2, 1, 1}, {}, glm::dvec3(1.0), ScalarType::F64, nothing)) ==
         ScalarRange());
 }
 

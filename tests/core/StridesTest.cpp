@@ -52,7 +52,7 @@ void requireSame(const Block& seen, const Block& expected, const IndexBox& part)
   REQUIRE(sameNumber(storedValueAt(seen, part.lo), storedValueAt(expected, part.lo)));
   REQUIRE(sameNumber(valueAt(seen, part.lo.x, part.lo.y, part.lo.z),
                      valueAt(expected, part.lo.x, part.lo.y, part.lo.z)));
-  REQUIRE(finiteRange(seen) == finiteRange(expected));
+  REQUIRE(ownRange(seen) == ownRange(expected));
   const ValueSizes a = valueSizesOf(std::span(&seen, 1));
   const ValueSizes b = valueSizesOf(std::span(&expected, 1));
   REQUIRE((a.usable == b.usable && a.tooSmall == b.tooSmall));
@@ -96,10 +96,10 @@ TEST_CASE("a stride of 0 repeats values") {
   block.setStrides({sizeof(float), 0, 0});
   CHECK(!block.isPacked());
   CHECK(valueAt(block, 1, 2, 4) == -2.0);
-  CHECK(finiteRange(block) == ScalarRange{-2.0, 4.0});
+  CHECK(ownRange(block) == ScalarRange{-2.0, 4.0});
   block.setStrides({0, 0, 0});
   CHECK(valueAt(block, 3, 2, 4) == 1.0);
-  CHECK(finiteRange(block) == ScalarRange{1.0, 1.0});
+  CHECK(ownRange(block) == ScalarRange{1.0, 1.0});
 }
 
 TEST_CASE("strides that say that values are packed leave a block packed") {
@@ -199,7 +199,7 @@ TEST_CASE("components are shown as they are, or as doubles that are computed") {
     CHECK(block.type == ScalarType::F64);
     CHECK(storedValueAt(block, {1, 0, 0}) == double(values[1]));
     CHECK(storedValueAt(block, dims - 1) == double(values.back()));
-    CHECK(finiteRange(block).min == double(*std::min_element(values.begin(), values.end())));
+    CHECK(ownRange(block).min == double(*std::min_element(values.begin(), values.end())));
     const std::vector<std::uint64_t> large(count, std::numeric_limits<std::uint64_t>::max());
     showComponent(block, arrayOf(large, dims, 1, ComponentType::U64), magnitude);
     CHECK(storedValueAt(block, {1, 1, 1}) == 0x1p64);

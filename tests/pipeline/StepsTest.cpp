@@ -2,8 +2,10 @@
 #include <array>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <variant>
+#include <vector>
 
 #include "tests/Catch.h"
 #include "tests/Devices.h"
@@ -12,6 +14,7 @@
 #include "vdi/pipeline/VdiGenerator.h"
 
 using namespace vdi;
+using synthetic::Joint;
 using test::device;
 
 namespace {
@@ -131,6 +134,102 @@ TEST_CASE("the range of the shown step is that of its finite values") {
   CHECK(rangeOf({{-largest, 0, 0, 0, 0, 0, 0, largest}}) == ScalarRange{-largest, largest});
   CHECK(rangeOf({{nan, nan, nan, nan, nan, nan, nan, infinite}}) == ScalarRange());
   CHECK(device()->validationMessages() == "");
+}
+
+namespace {
+
+/// Ghost layers that hold `garbage`, either everywhere or at edges and corners only.
+struct Halos {
+  ScalarType type;
+  Joint joint;
+  int layers;
+  double garbage;
+  bool onlyEdges = false;
+};
+
+/// The value at an index of the lattice.
+double ownValue(const glm::ivec3& index) {
+  return 20.0 + index.x + index.y + index.z;
+}
+
+/// A block whose values without ghost layers are those at [first, last).
+Block withGarbage(const Halos& halos, const glm::ivec3& first, const glm::ivec3& last) {
+  const glm::ivec3 dims = last - first + 2 * halos.layers;
+  const IndexBox all{first - halos.layers, last + halos.layers};
+  const auto valueAt = [&](const glm::ivec3& at) {
+    const glm::ivec3 nearest = glm::clamp(at, first, last - 1);
+    int outside = 0;
+    for (int axis = 0; axis < 3; ++axis) outside += at[axis] != nearest[axis] ? 1 : 0;
+    return outside > (halos.onlyEdges ? 1 : 0) ? halos.garbage : ownValue(nearest);
+  };
+  const std::shared_ptr<std::byte[]> values(new std::byte[all.count() * sizeOf(halos.type)]);
+  for (int z = all.lo.z; z < all.hi.z; ++z) {
+    for (int y = all.lo.y; y < all.hi.y; ++y) {
+      for (int x = all.lo.x; x < all.hi.x; ++x) {
+        const glm::ivec3 at(x, y, z);
+        storeValue(halos.type, values.get(), all.position(at), valueAt(at));
+      }
+    }
+  }
+  const GhostLayers ghosts{glm::ivec3(halos.layers), glm::ivec3(halos.layers)};
+  const glm::dvec3 corner(all.lo);
+  const auto make = halos.joint == Joint::Cells ? &Block::fromCells : &Block::fromPoints;
+  Block block = make(dims, corner, glm::dvec3(1.0), halos.type, values.get(), ghosts);
+  block.keepAlive = values;
+  return block;
+}
+
+}  // namespace
+
+TEST_CASE("the range is that of the values that blocks own, whatever ghost layers hold") {
+  const auto type =
+      GENERATE(ScalarType::U8, ScalarType::I16, ScalarType::F32, ScalarType::I32, ScalarType::F64);
+  const auto joint = GENERATE(Joint::Cells, Joint::SharedPoints, Joint::Gap);
+  const auto layers = GENERATE(1, 3);
+  const auto garbage = GENERATE(0.0, 1e30, 1e305);
+  const bool onlyEdges = garbage == 1e305;  // elsewhere, values of this size are an error
+  if (onlyEdges && type != ScalarType::F64) return;
+  INFO(toString(type) << ", joint " << static_cast<int>(joint) << ", layers " << layers << ", " << garbage);
+  const Halos halos{type, joint, layers, garbage, onlyEdges};
+  const glm::ivec3 size(20, 37, 18);
+  const int shared = joint == Joint::SharedPoints ? 1 : 0;
+  const ScalarRange expected{ownValue(glm::ivec3(0)), ownValue(size - 1)};
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks({withGarbage(halos, glm::ivec3(0), size)});
+  CHECK(generator.scalarRange() == expected);
+  std::vector<Block> eight;
+  for (int i = 0; i < 8; ++i) {
+    const glm::ivec3 upper(i % 2, i / 2 % 2, i / 4);
+    const glm::ivec3 middle = size / 2;
+    const glm::ivec3 last = glm::mix(middle + shared, size, glm::bvec3(upper));
+    eight.push_back(withGarbage(halos, upper * middle, last));
+  }
+  generator.setBlocks(eight);
+  CHECK(generator.scalarRange() == expected);
+  CHECK(device()->validationMessages() == "");
+}
+
+TEST_CASE("values that a finer block covers don't count for the range") {
+  const auto type = GENERATE(ScalarType::U16, ScalarType::F32, ScalarType::F64);
+  INFO(toString(type));
+  std::vector<Block> blocks;
+  const Halos halos{type, Joint::Cells, 0, 0.0};
+  // The coarse block has a value of its own in the middle, where the fine block has others.
+  const glm::ivec3 size(40, 20, 20);
+  Block coarse = withGarbage(halos, glm::ivec3(0), size);
+  const std::shared_ptr<std::byte[]> values(new std::byte[coarse.byteCount()]);
+  const IndexBox covered{{10, 4, 4}, {34, 16, 16}};
+  for (std::size_t i = 0; i < coarse.valueCount(); ++i)
+    storeValue(type, values.get(), i, loadValue(type, coarse.data, i));
+  storeValue(type, values.get(), coarse.stored().position({20, 10, 10}), 5000.0);
+  storeValue(type, values.get(), coarse.stored().position({11, 5, 5}), 0.0);
+  coarse.data = values.get();
+  const std::vector<std::uint16_t> ones(24U * 24U * 48U, 30);
+  Block fine =
+      Block::fromCells({48, 24, 24}, glm::dvec3(covered.lo), glm::dvec3(0.5), ScalarType::U16, ones.data());
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  generator.setBlocks({coarse, fine});
+  CHECK(generator.scalarRange() == ScalarRange{ownValue(glm::ivec3(0)), ownValue(size - 1)});
 }
 
 TEST_CASE("steps that are never shown, and invalid ones, leave the shown one intact") {

@@ -42,29 +42,11 @@ glm::ivec3 indexOf(const glm::dvec3& index, const Block& block) {
   return glm::ivec3(glm::clamp(index, -beyond, glm::dvec3(block.dims) + beyond));
 }
 
-/// Indices of the box's points, including those on its faces, or of its cells.
-IndexBox valuesIn(const Box& box, const Block& block) {
-  const glm::dvec3 origin = block.origin - block.offset * block.spacing;
-  return {indexOf(glm::ceil((box.lo - origin) / block.spacing - indexTolerance), block),
-          indexOf(glm::floor((box.hi - origin) / block.spacing + indexTolerance) + 1.0, block)};
-}
-
 /// Indices of the values for interpolation in the box and up to `reach` beyond.
 IndexBox valuesFor(const Box& box, const Block& block) {
   const double beyond = reach - indexTolerance;
   return {indexOf(glm::floor((box.lo - block.origin) / block.spacing - beyond), block),
           indexOf(glm::ceil((box.hi - block.origin) / block.spacing + beyond) + 1.0, block)};
-}
-
-void subtract(std::vector<IndexBox>& boxes, const IndexBox& hole) {
-  const auto meets = [&hole](const IndexBox& box) { return !box.intersection(hole).empty(); };
-  if (std::none_of(boxes.begin(), boxes.end(), meets)) return;
-  std::vector<IndexBox> rest;
-  for (const IndexBox& box : boxes) {
-    const std::vector<IndexBox> parts = without(box, hole);
-    rest.insert(rest.end(), parts.begin(), parts.end());
-  }
-  boxes = std::move(rest);
 }
 
 /// The part of a block's stored values straight beside its core, on both sides along the axis, and the core.
@@ -242,7 +224,10 @@ class LayerExchange {
       findWanted(grids_[i]);
       for (std::size_t w = 0; w < grids_[i].wanted.size(); ++w) askFor(i, w);
     }
-    for (std::size_t i = 0; i < grids_.size(); ++i) makePatches(i);
+    for (std::size_t i = 0; i < grids_.size(); ++i) {
+      makePatches(i);
+      noteOwnValues(grids_[i]);
+    }
     rounds_.resize(levels_.size() + firstCoarserRound);
     for (const auto& asked : outgoing_) {
       for (const Asked& one : asked) rounds_[static_cast<std::size_t>(one.question.round)] = 1;
@@ -267,6 +252,7 @@ class LayerExchange {
       const Block& filled = grids_[static_cast<std::size_t>(entry.grid)].block;
       block.extra = filled.extra;
       block.patches = filled.patches;
+      block.ownValues = filled.ownValues;
     }
   }
 
@@ -311,7 +297,7 @@ class LayerExchange {
         grid.volume = entry.valueVolume();
       }
       Grid& grid = grids_[index];
-      grid.core.include(valuesIn(entry.asked, grid.block).intersection(grid.block.stored()));
+      grid.core.include(grid.block.valuesIn(entry.asked));
       const OwnParts& own = parts[i - directory_.firstMine()];
       grid.owned.insert(grid.owned.end(), own.boxes.begin(), own.boxes.end());
       grid.finer.insert(grid.finer.end(), own.finer.begin(), own.finer.end());
@@ -319,9 +305,9 @@ class LayerExchange {
     for (Grid& grid : grids_) {
       for (const Box& box : grid.owned) {
         // A ghost value in a gap that the block has closed is not its own.
-        std::vector<IndexBox> values{valuesIn(box, grid.block).intersection(grid.core)};
+        std::vector<IndexBox> values{grid.block.valuesIn(box).intersection(grid.core)};
         // Points on a finer block's face belong to the finer block.
-        for (const Box& finer : grid.finer) subtract(values, valuesIn(finer, grid.block));
+        for (const Box& finer : grid.finer) subtract(values, grid.block.valuesIn(finer));
         std::erase_if(values, [](const IndexBox& part) { return part.empty(); });
         grid.given.insert(grid.given.end(), values.begin(), values.end());
       }
@@ -556,6 +542,16 @@ class LayerExchange {
       patches->push_back({box, std::shared_ptr<const void>(wanted.values, wanted.values.get())});
     }
     if (!patches->empty()) grid.block.patches = std::move(patches);
+  }
+
+  static void noteOwnValues(Grid& grid) {
+    auto own = std::make_shared<OwnValues>();
+    own->boxes = grid.given;
+    if (grid.block.masked) {
+      for (const IndexBox& masked : *grid.block.masked) subtract(own->boxes, masked);
+    }
+    own->used = grid.used;
+    grid.block.ownValues = std::move(own);
   }
 
   /// Cells of several levels end at different distances from the domain's faces. With a single level, the

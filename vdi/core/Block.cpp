@@ -26,34 +26,47 @@ constexpr std::array<std::pair<const char*, std::size_t>, 8> scalarTypes{
 /// This loop is written so that compilers vectorise it. It runs for every value of every step; a loop with a
 /// branch and one pair of bounds would take several times as long as the upload.
 template <typename T>
-ScalarRange finiteRangeOf(std::span<const T> values) {
-  using Limits = std::numeric_limits<T>;
-  constexpr std::size_t lanes = 64 / sizeof(T);
-  std::array<T, lanes> minimum;
-  std::array<T, lanes> maximum;
-  minimum.fill(Limits::max());
-  maximum.fill(Limits::lowest());
-  const auto include = [&](std::size_t lane, T value) {
-    T low = value;
-    T high = value;
-    if constexpr (std::is_floating_point_v<T>) {
-      const bool finite = std::abs(value) <= Limits::max();
-      low = finite ? value : Limits::max();
-      high = finite ? value : Limits::lowest();
-    }
-    minimum[lane] = low < minimum[lane] ? low : minimum[lane];
-    maximum[lane] = high > maximum[lane] ? high : maximum[lane];
-  };
-  std::size_t i = 0;
-  for (; i + lanes <= values.size(); i += lanes) {
-    for (std::size_t lane = 0; lane < lanes; ++lane) include(lane, values[i + lane]);
+class Extremes {
+ public:
+  Extremes() {
+    minimum_.fill(Limits::max());
+    maximum_.fill(Limits::lowest());
   }
-  for (; i < values.size(); ++i) include(0, values[i]);
-  const T low = *std::min_element(minimum.begin(), minimum.end());
-  const T high = *std::max_element(maximum.begin(), maximum.end());
-  if (high < low) return {};  // no finite value
-  return {static_cast<double>(low), static_cast<double>(high)};
-}
+  void include(std::span<const T> values) {
+    std::array<T, lanes> minimum = minimum_;
+    std::array<T, lanes> maximum = maximum_;
+    const auto take = [&](std::size_t lane, T value) {
+      T low = value;
+      T high = value;
+      if constexpr (std::is_floating_point_v<T>) {
+        const bool finite = std::abs(value) <= Limits::max();
+        low = finite ? value : Limits::max();
+        high = finite ? value : Limits::lowest();
+      }
+      minimum[lane] = low < minimum[lane] ? low : minimum[lane];
+      maximum[lane] = high > maximum[lane] ? high : maximum[lane];
+    };
+    std::size_t i = 0;
+    for (; i + lanes <= values.size(); i += lanes) {
+      for (std::size_t lane = 0; lane < lanes; ++lane) take(lane, values[i + lane]);
+    }
+    for (; i < values.size(); ++i) take(0, values[i]);
+    minimum_ = minimum;
+    maximum_ = maximum;
+  }
+  ScalarRange range() const {
+    const T low = *std::min_element(minimum_.begin(), minimum_.end());
+    const T high = *std::max_element(maximum_.begin(), maximum_.end());
+    if (high < low) return {};  // no finite value
+    return {static_cast<double>(low), static_cast<double>(high)};
+  }
+
+ private:
+  using Limits = std::numeric_limits<T>;
+  static constexpr std::size_t lanes = 64 / sizeof(T);
+  std::array<T, lanes> minimum_;
+  std::array<T, lanes> maximum_;
+};
 
 }  // namespace
 
@@ -101,6 +114,24 @@ void storeValue(ScalarType type, void* data, std::size_t index, double value) {
       values[index] = static_cast<T>(value);
     }
   });
+}
+
+std::vector<IndexBox> Block::ownBoxes() const {
+  if (ownValues) return ownValues->boxes;
+  std::vector<IndexBox> boxes{valuesIn(owned)};
+  if (!masked) return boxes;
+  for (const IndexBox& box : *masked) subtract(boxes, box);
+  return boxes;
+}
+
+IndexBox Block::valuesIn(const Box& box) const {
+  constexpr double tolerance = 0.01;  // in spacings: more than rounding moves a face
+  const glm::dvec3 first = origin - offset * spacing;
+  const glm::dvec3 most(dims);
+  const glm::dvec3 lo = glm::ceil((box.lo - first) / spacing - tolerance);
+  const glm::dvec3 hi = glm::floor((box.hi - first) / spacing + tolerance) + 1.0;
+  return {glm::ivec3(glm::clamp(lo, glm::dvec3(0.0), most)),
+          glm::ivec3(glm::clamp(hi, glm::dvec3(0.0), most))};
 }
 
 void Block::moveValues(const glm::dvec3& spacings) {
@@ -151,48 +182,67 @@ void ScalarRange::include(const ScalarRange& other) {
 
 namespace {
 
-ScalarRange finiteRangeOf(ScalarType type, const void* data, std::size_t count) {
-  return withTyped(type, data, [count](const auto* values) {
-    constexpr std::size_t minimum = 1 << 19;
-    std::mutex mutex;
-    ScalarRange range;
-    inParallel(count, minimum, [&](std::size_t first, std::size_t last) {
-      const ScalarRange part = finiteRangeOf(std::span(values + first, last - first));
-      const std::lock_guard lock(mutex);
-      range.include(part);
-    });
-    return range;
-  });
+/// Calls `include` with spans that make up the stored values of a tile. Gathers them if they aren't packed.
+template <typename T, typename Include>
+void forEachSpan(const Block& block, const IndexBox& tile, TileBuffer& buffer, Include include) {
+  if (!block.isPacked()) {
+    block.copyTo(tile, buffer.bytes.data());
+    return include(std::span(reinterpret_cast<const T*>(buffer.bytes.data()), tile.count()));
+  }
+  const auto* values = static_cast<const T*>(block.data);
+  const auto length = static_cast<std::size_t>(tile.size().x);
+  for (int z = tile.lo.z; z < tile.hi.z; ++z) {
+    for (int y = tile.lo.y; y < tile.hi.y; ++y)
+      include(std::span(values + block.stored().position({tile.lo.x, y, z}), length));
+  }
 }
 
-/// The range of strided or computed values, read tile by tile.
-ScalarRange finiteRangeOfTiles(const Block& block) {
-  const Tiling tiles = block.tilesOf(block.stored());
-  constexpr std::size_t minimum = 64;
+/// The range of the finite stored values in a box.
+ScalarRange finiteRangeIn(const Block& block, const IndexBox& box) {
+  const Tiling tiles = block.tilesOf(box);
+  constexpr std::size_t minimum = 128;
   std::mutex mutex;
   ScalarRange range;
   inParallel(tiles.count(), minimum, [&](std::size_t first, std::size_t last) {
-    TileBuffer buffer;
-    ScalarRange part;
-    for (std::size_t i = first; i < last; ++i) {
-      const IndexBox tile = tiles[i];
-      block.copyTo(tile, buffer.bytes.data());
-      withTyped(block.type, static_cast<const void*>(buffer.bytes.data()),
-                [&](const auto* values) { part.include(finiteRangeOf(std::span(values, tile.count()))); });
-    }
-    const std::lock_guard lock(mutex);
-    range.include(part);
+    withTyped(block.type, block.data, [&](const auto* typed) {
+      using T = std::remove_cvref_t<decltype(*typed)>;
+      TileBuffer buffer;
+      Extremes<T> extremes;
+      for (std::size_t i = first; i < last; ++i)
+        forEachSpan<T>(block, tiles[i], buffer, [&](std::span<const T> values) { extremes.include(values); });
+      const std::lock_guard lock(mutex);
+      range.include(extremes.range());
+    });
   });
   return range;
 }
 
+ScalarRange finiteRangeOf(ScalarType type, const Patch& patch) {
+  return withTyped(type, patch.values.get(), [&patch](const auto* values) {
+    Extremes<std::remove_cvref_t<decltype(*values)>> extremes;
+    extremes.include(std::span(values, patch.box.count()));
+    return extremes.range();
+  });
+}
+
 }  // namespace
 
-ScalarRange finiteRange(const Block& block) {
-  ScalarRange range = block.isPacked() ? finiteRangeOf(block.type, block.data, block.valueCount())
-                                       : finiteRangeOfTiles(block);
-  for (const Patch& patch : block.patchList())
-    range.include(finiteRangeOf(block.type, patch.values.get(), patch.box.count()));
+FiniteRanges finiteRanges(const Block& block, std::span<const IndexBox> own) {
+  FiniteRanges ranges;
+  for (const IndexBox& box : own) ranges.own.include(finiteRangeIn(block, box));
+  ranges.used = ranges.own;
+  for (const Patch& patch : block.patchList()) ranges.used.include(finiteRangeOf(block.type, patch));
+  const IndexBox stored = block.stored();
+  std::vector<IndexBox> others{block.ownValues ? block.ownValues->used.intersection(stored) : stored};
+  for (const IndexBox& box : own) subtract(others, box);
+  for (const Patch& patch : block.patchList()) subtract(others, patch.box);
+  for (const IndexBox& box : others) ranges.used.include(finiteRangeIn(block, box));
+  return ranges;
+}
+
+ScalarRange ownRange(const Block& block) {
+  ScalarRange range;
+  for (const IndexBox& box : block.ownBoxes()) range.include(finiteRangeIn(block, box));
   return range;
 }
 

@@ -31,6 +31,13 @@ struct Patch {
   std::shared_ptr<const void> values;  // [size.z][size.y][size.x], x fastest, of the block's scalar type
 };
 
+/// The stored values of a block that the data consist of. Others lie in ghost layers, are covered by finer
+/// blocks, or have no meaning.
+struct OwnValues {
+  std::vector<IndexBox> boxes;  // they may overlap
+  IndexBox used;                // bounds of all values that interpolation uses
+};
+
 /// Stored values that are computed whenever they are read, so that no array of them exists.
 class ComputedValues {
  public:
@@ -76,6 +83,8 @@ struct Block {
   /// Stored values without meaning, such as those of hidden points and refined cells. Where interpolation
   /// would mix them with other values, the exchange of ghost layers replaces them. Null: none.
   std::shared_ptr<const std::vector<IndexBox>> masked{};
+  /// Null: those in the owned box, except for masked ones. The exchange of ghost layers sets it.
+  std::shared_ptr<const OwnValues> ownValues{};
   std::optional<ByteStrides> strides{};  // where the values lie from `data` on; any alignment
   std::shared_ptr<const ComputedValues> computed{};
   /// Offset of the values, in spacings, from the grid's points or cell centres. `origin` includes it.
@@ -91,6 +100,10 @@ struct Block {
            static_cast<std::size_t>(dims.z);
   }
   std::size_t byteCount() const { return valueCount() * sizeOf(type); }
+  /// Boxes of the block's own values.
+  std::vector<IndexBox> ownBoxes() const;
+  /// Indices of the stored points in the box, including those on its faces, or of the stored cells in it.
+  IndexBox valuesIn(const Box& box) const;
   bool isPacked() const { return !strides && !computed; }
   /// Moves the values, as staggered grids need, by a distance in spacings. The owned box stays.
   void moveValues(const glm::dvec3& spacings);
@@ -128,7 +141,15 @@ double loadValue(ScalarType type, const void* data, std::size_t index);
 /// Stores the nearest value that the type can represent; integers take 0 for NaN.
 void storeValue(ScalarType type, void* data, std::size_t index, double value);
 
-ScalarRange finiteRange(const Block& block);  // range of stored values and patches; uses several threads
+/// Ranges of finite values.
+struct FiniteRanges {
+  ScalarRange own;
+  ScalarRange used;  // of own values, of other stored ones that interpolation uses, and of patches
+  bool operator==(const FiniteRanges&) const = default;
+};
+/// `own` are the own values of all blocks that share this one's. Uses several threads.
+FiniteRanges finiteRanges(const Block& block, std::span<const IndexBox> own);
+ScalarRange ownRange(const Block& block);  // the range of its own finite values
 
 /// Range of magnitudes that the device can represent. If all values are smaller than `minimum`, they are
 /// lost; values larger than `maximum` overflow. Applies to f32 and f64; the other types have no such values.

@@ -3,8 +3,18 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <utility>
 
 namespace vdi {
+
+void subtract(std::vector<IndexBox>& boxes, const IndexBox& hole) {
+  const auto meets = [&hole](const IndexBox& box) { return !box.intersection(hole).empty(); };
+  if (std::none_of(boxes.begin(), boxes.end(), meets)) return;
+  std::vector<IndexBox> rest;
+  for (const IndexBox& box : boxes)
+    forEachPartWithout(box, hole, [&rest](const IndexBox& part) { rest.push_back(part); });
+  boxes = std::move(rest);
+}
 
 std::vector<IndexBox> coverWithBoxes(const glm::ivec3& size, std::vector<bool> open) {
   const IndexBox all{glm::ivec3(0), size};

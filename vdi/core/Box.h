@@ -84,6 +84,9 @@ std::vector<AnyBox> without(const AnyBox& box, const AnyBox& hole) {
   return parts;
 }
 
+/// Replaces boxes by their parts outside `hole`.
+void subtract(std::vector<IndexBox>& boxes, const IndexBox& hole);
+
 /// Disjoint boxes that cover exactly the `open` cells (x fastest) of a lattice of `size`. Boxes grow along x,
 /// then y, then z, so a box of open cells stays one box.
 std::vector<IndexBox> coverWithBoxes(const glm::ivec3& size, std::vector<bool> open);

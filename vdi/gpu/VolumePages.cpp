@@ -69,7 +69,7 @@ VkFormat formatOf(const Device& device, ScalarType type) {
 
 }  // namespace
 
-ValueMap valueMapOf(const Block& block) {
+ValueMap valueMapOf(const Block& block, std::span<const IndexBox> own) {
   switch (block.type) {
     case ScalarType::U8:
       return {255.0, 0.0, true, {}};
@@ -86,7 +86,8 @@ ValueMap valueMapOf(const Block& block) {
     case ScalarType::F64:
       break;
   }
-  const ScalarRange range = finiteRange(block);
+  const FiniteRanges ranges = finiteRanges(block, own);
+  const ScalarRange& range = ranges.used;
   const double maximum = limitsOf(block.type).maximum;
   if (range.min < -maximum || range.max > maximum) {
     throw Error(
@@ -95,14 +96,15 @@ ValueMap valueMapOf(const Block& block) {
                     "use other units",
                     toString(block.type), range.min, range.max, maximum));
   }
-  if (!(range.min < range.max)) return {1.0, std::isfinite(range.min) ? range.min : 0.0, false, range};
+  if (!(range.min < range.max)) return {1.0, std::isfinite(range.min) ? range.min : 0.0, false, ranges};
   // Texels are relative to 0, or to the value nearest to 0: floats resolve small values best, and a large
   // negative fill value leaves the others unchanged.
   const double offset = std::clamp(0.0, range.min, range.max);
-  return {std::max(range.max - offset, offset - range.min), offset, false, range};
+  return {std::max(range.max - offset, offset - range.min), offset, false, ranges};
 }
 
-std::vector<VolumePiece> cutToPieces(const Device& device, const Block& block) {
+std::vector<VolumePiece> cutToPieces(const Device& device, const Block& block,
+                                     std::span<const IndexBox> own) {
   const VkFormat format = formatOf(device, block.type);
   const std::uint64_t maxTexels = device.limits().maxAllocationBytes / texelBytes(format) / 2;
   const IndexBox all = block.extended();
@@ -111,7 +113,7 @@ std::vector<VolumePiece> cutToPieces(const Device& device, const Block& block) {
     const int axis = largest.z >= largest.x && largest.z >= largest.y ? 2 : largest.y >= largest.x ? 1 : 0;
     largest[axis] = (largest[axis] + 1) / 2;
   }
-  const ValueMap values = valueMapOf(block);
+  const ValueMap values = valueMapOf(block, own);
   std::vector<VolumePiece> pieces;
   // Neighbours share a face's values and one layer on either side of it.
   const glm::ivec3 stride = glm::max(glm::ivec3(largest) - 1 - 2 * pieceMargin, glm::ivec3(1));

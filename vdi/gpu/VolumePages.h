@@ -19,11 +19,12 @@ namespace vdi::gpu {
 struct ValueMap {
   double scale = 1.0;
   double offset = 0.0;
-  bool whole = false;                // values are integers
-  std::optional<ScalarRange> range;  // range of finite values, if it had to be computed
+  bool whole = false;                  // values are integers
+  std::optional<FiniteRanges> ranges;  // ranges of values, if they had to be computed
 };
-/// Throws Error{InvalidArgument} for values beyond limitsOf(type).maximum.
-ValueMap valueMapOf(const Block& block);
+/// `own` are the own values of all blocks that share this one's. Throws Error{InvalidArgument} for values
+/// beyond limitsOf(type).maximum.
+ValueMap valueMapOf(const Block& block, std::span<const IndexBox> own);
 
 /// Number of elements.
 inline std::uint64_t volumeOf(const glm::uvec3& extent) {
@@ -38,7 +39,9 @@ struct VolumePiece {
   VkFormat format = VK_FORMAT_UNDEFINED;
   ValueMap values;
   std::uint32_t page = 0;
-  glm::uvec3 place{0};                                                // in the page, texels
+  glm::uvec3 place{0};         // in the page, texels
+  std::uint32_t firstOwn = 0;  // the piece's boxes of own texels
+  std::uint32_t ownCount = 0;
   IndexBox box() const { return {first, first + glm::ivec3(dims)}; }  // in the block's indices
   bool samePlaceAs(const VolumePiece& other) const { return dims == other.dims && format == other.format; }
 };
@@ -49,7 +52,7 @@ constexpr int pieceMargin = 1;
 
 /// Cuts the block, extra layers included, into pieces that each fit a page. They overlap, so that each can
 /// interpolate without the others.
-std::vector<VolumePiece> cutToPieces(const Device& device, const Block& block);
+std::vector<VolumePiece> cutToPieces(const Device& device, const Block& block, std::span<const IndexBox> own);
 
 struct PageShape {
   glm::uvec3 extent{0};

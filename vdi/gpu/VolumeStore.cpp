@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -25,12 +26,48 @@ namespace {
 /// weight 0, and NaN times 0 is NaN.
 constexpr double filterGuard = 2.0 / 256.0;
 
-/// Smallest value, largest value with its bits inverted, and whether there are infinite values, as cells.comp
-/// writes them.
+/// Smallest value, largest value with its bits inverted, both for all values and for own ones, and whether
+/// there are infinite values, as cells.comp writes them.
 using PieceRangeBits = std::array<std::uint32_t, shared::pieceRangeWords>;
 
 float fromOrdered(std::uint32_t bits) {
   return bit_cast<float>((bits >> 31U) != 0 ? bits & 0x7FFFFFFFU : ~bits);
+}
+
+using ValuesKey = std::tuple<const void*, std::array<std::int64_t, 3>, const void*, std::array<double, 3>>;
+
+/// Equal for blocks that share values.
+ValuesKey keyOf(const Block& block) {
+  const ByteStrides strides = block.strides.value_or(ByteStrides(0));
+  return {block.data,
+          {strides.x, strides.y, strides.z},
+          block.patches.get(),
+          {block.origin.x, block.origin.y, block.origin.z}};
+}
+
+/// Blocks that share values (the parts of a box with holes) share their pieces.
+struct SharedValues {
+  std::vector<IndexBox> own;  // own values of any of these blocks
+  const OwnValues* last = nullptr;
+  std::optional<PieceRange> pieces;
+
+  void addOwn(const Block& block) {
+    if (block.ownValues && block.ownValues.get() == last) return;
+    last = block.ownValues.get();
+    const std::vector<IndexBox> boxes = block.ownBoxes();
+    own.insert(own.end(), boxes.begin(), boxes.end());
+  }
+};
+
+/// Adds the boxes of a piece's own texels, and notes their places in the piece.
+void addOwnTexels(std::vector<shared::TexelBox>& texels, VolumePiece& piece, std::span<const IndexBox> own) {
+  piece.firstOwn = static_cast<std::uint32_t>(texels.size());
+  for (const IndexBox& box : own) {
+    const IndexBox part = box.intersection(piece.box());
+    if (!part.empty())
+      texels.push_back({glm::uvec3(part.lo - piece.first), glm::uvec3(part.hi - piece.first)});
+  }
+  piece.ownCount = static_cast<std::uint32_t>(texels.size()) - piece.firstOwn;
 }
 
 }  // namespace
@@ -113,27 +150,26 @@ void VolumeStore::lay(Step& step, std::span<const Block> blocks, const Scene& sc
   step.blocks.assign(blocks.begin(), blocks.end());
   std::vector<VolumePiece> pieces;
   std::vector<PieceRange> piecesOf;  // pieces of each block
-  // Blocks that share values (the parts of a box with holes) share their pieces.
-  using Key = std::tuple<const void*, std::array<std::int64_t, 3>, const void*, std::array<double, 3>>;
-  std::map<Key, PieceRange> known;
+  std::map<ValuesKey, SharedValues> known;
   for (const Block& block : step.blocks) {
-    PieceRange range;
-    if (!block.owned.empty()) {
-      const ByteStrides strides = block.strides.value_or(ByteStrides(0));
-      const Key key{block.data,
-                    {strides.x, strides.y, strides.z},
-                    block.patches.get(),
-                    {block.origin.x, block.origin.y, block.origin.z}};
-      const auto [place, isNew] = known.try_emplace(key);
-      if (isNew) {
-        const std::vector<VolumePiece> parts = cutToPieces(*device_, block);
-        place->second.first = static_cast<std::uint32_t>(pieces.size());
-        pieces.insert(pieces.end(), parts.begin(), parts.end());
-        place->second.last = static_cast<std::uint32_t>(pieces.size());
-      }
-      range = place->second;
+    if (!block.owned.empty()) known[keyOf(block)].addOwn(block);
+  }
+  step.ownTexels.clear();
+  for (const Block& block : step.blocks) {
+    if (block.owned.empty()) {
+      piecesOf.emplace_back();
+      continue;
     }
-    piecesOf.push_back(range);
+    SharedValues& values = known[keyOf(block)];
+    if (!values.pieces) {
+      const auto first = static_cast<std::uint32_t>(pieces.size());
+      for (VolumePiece& piece : cutToPieces(*device_, block, values.own)) {
+        addOwnTexels(step.ownTexels, piece, values.own);
+        pieces.push_back(piece);
+      }
+      values.pieces = {first, static_cast<std::uint32_t>(pieces.size())};
+    }
+    piecesOf.push_back(*values.pieces);
   }
   makePages(step, std::move(pieces));
   layCells(step);
@@ -223,6 +259,8 @@ void VolumeStore::layCells(Step& step) const {
     cellPiece.page = piece.page;
     cellPiece.dims = piece.dims;
     cellPiece.firstCell = static_cast<std::uint32_t>(cells);
+    cellPiece.firstOwn = piece.firstOwn;
+    cellPiece.ownCount = piece.ownCount;
     // A cell lies between texel centres.
     const glm::uvec3 gaps = glm::max(piece.dims, glm::uvec3(2)) - 1U;
     cellPiece.cellDims = (gaps + shared::cellSide - 1U) / shared::cellSide;
@@ -250,11 +288,12 @@ void VolumeStore::finish(Step& step) {
   for (VolumePiece& piece : step.pieces) piece.block = nullptr;
   if (!table_.entries.empty()) placeTable(step);
   runCells(step, true);
-  step.range = rangeOf(step);
+  step.ranges = rangesOf(step);
   step.infinite = false;
   if (step.cellCount == 0) return;
   const auto found = pieceRanges_.mappedAs<PieceRangeBits>();
-  for (std::size_t i = 0; i < step.pieces.size(); ++i) step.infinite = step.infinite || found[i][2] == 0U;
+  for (std::size_t i = 0; i < step.pieces.size(); ++i)
+    step.infinite = step.infinite || found[i][shared::pieceRangeInfinite] == 0U;
 }
 
 bool VolumeStore::mayBeInfinite() const {
@@ -263,27 +302,33 @@ bool VolumeStore::mayBeInfinite() const {
 }
 
 bool VolumeStore::reachesBeyondTable() const {
-  return shown().infinite || valueRange().min < table_.min || valueRange().max > table_.max;
+  const ScalarRange& used = shown().ranges.used;
+  return shown().infinite || used.min < table_.min || used.max > table_.max;
 }
 
-/// The values' range, after cells were measured.
-ScalarRange VolumeStore::rangeOf(const Step& step) const {
-  ScalarRange range;
+/// The values' ranges, after cells were measured.
+FiniteRanges VolumeStore::rangesOf(const Step& step) const {
+  FiniteRanges ranges;
   for (std::size_t i = 0; i < step.pieces.size(); ++i) {
     const ValueMap& values = step.pieces[i].values;
-    if (values.range) {
-      range.include(*values.range);
+    if (values.ranges) {
+      ranges.own.include(values.ranges->own);
+      ranges.used.include(values.ranges->used);
       continue;
     }
     const PieceRangeBits& bits = pieceRanges_.mappedAs<PieceRangeBits>()[i];
-    if (bits[0] == ~0U && bits[1] == ~0U) continue;  // no value is finite
     const auto valueOf = [&values](std::uint32_t ordered) {
       const double value = fromOrdered(ordered) * values.scale + values.offset;
       return values.whole ? std::round(value) : value;
     };
-    range.include({valueOf(bits[0]), valueOf(~bits[1])});
+    const auto include = [&](ScalarRange& range, std::uint32_t minimum, std::uint32_t maximumInverted) {
+      if (minimum == ~0U && maximumInverted == ~0U) return;  // no value is finite
+      range.include({valueOf(minimum), valueOf(~maximumInverted)});
+    };
+    include(ranges.used, bits[shared::pieceRangeAll], bits[shared::pieceRangeAll + 1]);
+    include(ranges.own, bits[shared::pieceRangeOwn], bits[shared::pieceRangeOwn + 1]);
   }
-  return range;
+  return ranges;
 }
 
 /// Measures cells if their values are new, and classifies them if there is a table.
@@ -294,6 +339,10 @@ void VolumeStore::runCells(Step& step, bool measure) {
   std::memcpy(step.cellPieceBuffer.mapped().data(), step.cellPieces.data(), bytes);
   shared::CellsConstants constants{};
   constants.pieces = step.cellPieceBuffer.address();
+  const auto ownBytes = std::span(step.ownTexels).size_bytes();
+  step.ownTexelsBuffer.reserve(device_, std::max(ownBytes, sizeof(shared::TexelBox)), MemoryKind::Upload);
+  if (ownBytes > 0) std::memcpy(step.ownTexelsBuffer.mapped().data(), step.ownTexels.data(), ownBytes);
+  constants.own = step.ownTexelsBuffer.address();
   constants.ranges = step.rangeBuffer.address();
   constants.pieceRanges = step.pieceRangeBuffer.address();
   constants.visible = step.visibleBuffer.address();

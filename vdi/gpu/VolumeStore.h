@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "shaders/shared/cells.h"
 #include "shaders/shared/volume.h"
 #include "vdi/core/Block.h"
 #include "vdi/core/Scene.h"
@@ -22,6 +23,12 @@
 #include "vdi/gpu/VolumeUpload.h"
 
 namespace vdi::gpu {
+
+/// A block's pieces are [first, last).
+struct PieceRange {
+  std::uint32_t first = 0;
+  std::uint32_t last = 0;
+};
 
 class VolumeStore {
  public:
@@ -56,8 +63,8 @@ class VolumeStore {
   /// last call.
   void setTable(const TransferTable& table, float slabLength);
 
-  /// The range of this rank's finite values.
-  const ScalarRange& valueRange() const { return shown().range; }
+  /// The ranges of this rank's values. `used` may include values that interpolation doesn't use.
+  const FiniteRanges& valueRanges() const { return shown().ranges; }
   /// Whether some values may not be finite.
   bool mayBeInfinite() const;
   /// Whether some values, including infinite ones, lie outside the table's range.
@@ -83,12 +90,6 @@ class VolumeStore {
   std::uint64_t slabsVersion() const { return slabsVersion_; }
 
  private:
-  /// A block's pieces are [first, last).
-  struct PieceRange {
-    std::uint32_t first = 0;
-    std::uint32_t last = 0;
-  };
-
   /// The blocks of a time step.
   struct Step {
     std::vector<Block> blocks;  // kept until their values are copied
@@ -100,8 +101,10 @@ class VolumeStore {
     std::vector<shared::KdNode> tree;
     std::vector<shared::CellPiece> cellPieces;  // one per piece; placeTable sets the table fields
     std::uint32_t cellCount = 0;
-    ScalarRange range;      // range of finite values
-    bool infinite = false;  // whether some values are infinite
+    FiniteRanges ranges;
+    bool infinite = false;                    // whether some values are infinite
+    std::vector<shared::TexelBox> ownTexels;  // of all pieces, one piece's after the other's
+    Buffer ownTexelsBuffer;
     Buffer cellPieceBuffer;
     Buffer rangeBuffer;
     Buffer pieceRangeBuffer;
@@ -120,7 +123,7 @@ class VolumeStore {
   void uploadSlabs();
   void placeTable(Step& step);
   void runCells(Step& step, bool measure);
-  ScalarRange rangeOf(const Step& step) const;
+  FiniteRanges rangesOf(const Step& step) const;
 
   std::shared_ptr<Device> device_;
   Commands commands_;

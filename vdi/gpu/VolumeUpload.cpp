@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -26,9 +27,12 @@ constexpr std::size_t maxImports = 256;
 constexpr std::size_t coresThatCopyFaster = 2;
 
 /// Makes infinite texels finite: they would turn what is interpolated with them into NaN, even with weight 0.
-float filterable(float texel) {
+/// Values that are never interpolated may lie beyond a float's range.
+template <typename Value>
+float filterable(Value texel) {
   const auto infinite = bit_cast<float>(shared::infiniteTexelBits);
-  return std::isinf(texel) ? std::copysign(infinite, texel) : texel;
+  const bool tooLarge = std::abs(texel) > static_cast<Value>(std::numeric_limits<float>::max());
+  return tooLarge ? std::copysign(infinite, texel < 0 ? -1.0F : 1.0F) : static_cast<float>(texel);
 }
 
 /// Whether some of the stored values in `part` of a block of f32 are infinite.
@@ -79,7 +83,7 @@ void convertRow(const void* from, std::size_t first, std::size_t count, std::byt
 void writeRow(ScalarType type, const void* data, VkFormat format, const ValueMap& values, std::size_t first,
               std::size_t count, std::byte* to) {
   const auto relative = [&values](auto value) {
-    return filterable(static_cast<float>((static_cast<double>(value) - values.offset) / values.scale));
+    return filterable((static_cast<double>(value) - values.offset) / values.scale);
   };
   const bool wide = format == VK_FORMAT_R16_UNORM;
   using U8 = std::uint8_t;
@@ -105,7 +109,7 @@ void writeRow(ScalarType type, const void* data, VkFormat format, const ValueMap
       return convertRow<std::int16_t, U16>(data, first, count, to,
                                            [](std::int16_t v) { return static_cast<U16>(v + 32768); });
     case ScalarType::F32:
-      return convertRow<float, float>(data, first, count, to, filterable);
+      return convertRow<float, float>(data, first, count, to, filterable<float>);
     case ScalarType::U32:
       return convertRow<std::uint32_t, float>(data, first, count, to, relative);
     case ScalarType::I32:

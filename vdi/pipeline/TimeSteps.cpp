@@ -74,10 +74,10 @@ TimeSteps::Step TimeSteps::send(std::vector<Block> blocks, bool fillGhosts,
 void TimeSteps::show(Step step) {
   shown_ = std::move(step);
   rate_.reset();
-  const ScalarRange& own = volume_.valueRange();
-  std::array<double, 2> minimum{own.min, -own.max};
+  const auto& [own, used] = volume_.valueRanges();
+  std::array<double, 4> minimum{own.min, -own.max, used.min, -used.max};
   comm_.allReduceMin(minimum);
-  range_ = {minimum[0], -minimum[1]};
+  ranges_ = {{minimum[0], -minimum[1]}, {minimum[2], -minimum[3]}};
 }
 
 void TimeSteps::dropNext() {
@@ -88,7 +88,7 @@ void TimeSteps::dropNext() {
 void TimeSteps::setBlocks(std::vector<Block> blocks, bool fillGhosts) {
   dropNext();
   shown_ = {};  // if one rank fails, no rank shows anything
-  range_ = {};
+  ranges_ = {};
   show(send(std::move(blocks), fillGhosts, &gpu::VolumeStore::setBlocks));
 }
 
@@ -121,12 +121,13 @@ double TimeSteps::samplingRate(const TransferTable& table, const Region& region)
 void TimeSteps::requireSpans(const TransferTable& table) const {
   // The device stores f64 as floats that give a value's position in the block's range.
   constexpr double maxCount = 1e33;
-  const double span = range_.max - range_.min;
+  const ScalarRange& range = ranges_.used;
+  const double span = range.max - range.min;
   if (!shown_.doubles || !(span > maxCount * (table.max - table.min))) return;
   throw Error(ErrorCode::InvalidArgument,
               fmt::format("the values are from {} to {}, the transfer function's from {} to {}: more than a "
                           "factor of {}; mark missing values as NaN, not as a large number",
-                          range_.min, range_.max, table.min, table.max, maxCount));
+                          range.min, range.max, table.min, table.max, maxCount));
 }
 
 void TimeSteps::report(RankReport& report) {

@@ -27,8 +27,8 @@ class TimeSteps {
   void setNextBlocks(std::vector<Block> blocks, bool fillGhosts);
   void advance();
 
-  const Scene& scene() const { return shown_.scene; }        // global
-  const ScalarRange& scalarRange() const { return range_; }  // global
+  const Scene& scene() const { return shown_.scene; }             // global
+  const ScalarRange& scalarRange() const { return ranges_.own; }  // global
   /// The rate that automaticRate becomes with this transfer function and region; equal on all ranks. Not
   /// collective.
   double samplingRate(const TransferTable& table, const Region& region);
@@ -55,7 +55,7 @@ class TimeSteps {
   const comm::Communicator& comm_;
   gpu::VolumeStore& volume_;
   Step shown_;
-  ScalarRange range_;
+  FiniteRanges ranges_;  // global
   /// The last sampling rate requested for the shown step.
   struct Rate {
     TransferTable table;

@@ -67,8 +67,10 @@ class VdiGenerator {
   /// if no upload is pending; then the current blocks stay.
   void advance();
 
-  const Scene& scene() const;              // global
-  const ScalarRange& scalarRange() const;  // global, finite values
+  const Scene& scene() const;  // global
+  /// The global range of finite values that blocks own. Ghost layers don't count, nor do values that finer
+  /// blocks cover.
+  const ScalarRange& scalarRange() const;
 
   /// Returns the VDI on rank 0, nullopt on the others. Its coloring has range and function; the caller knows
   /// the array and adds it. Camera, transfer function and settings must be equal on all ranks (otherwise all
