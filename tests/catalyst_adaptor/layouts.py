@@ -1,6 +1,5 @@
-"""A field in the layouts of real codes. Its pictures are the same as those of an array in order,
-and the host copies none of the layouts. Arguments: the case (same, ranks, ghosts, memory), and the
-program layouts.c with its launcher."""
+"""A field in the layouts of real codes: its pictures are the same as those of an array in order, and none of them is copied on
+the host. Arguments: the case (same, ranks, ghosts, isolated, memory), and the program layouts.c with its launcher."""
 
 import io
 import json
@@ -88,6 +87,12 @@ def ghosts():
     assert difference(pictures["star_mirror"], pictures["star_periodic"]) > 20, "the layers don't show"
 
 
+def isolated():
+    """Separate processes get what an array's strides, offset and ghost layers say: they make the same files."""
+    for field in ("padded", "staggered_thrice", "star_mirror"):
+        assert run(field, 24, 2, isolation="process")[0] == run(field, 24, 2)[0], field
+
+
 def memory():
     """A copy would take the field's bytes once more. mpirun must not bind the rank to a core, where the device would
     read values in order directly, and those of other layouts from a staging buffer."""
@@ -105,4 +110,4 @@ def memory():
 
 with tempfile.TemporaryDirectory() as folder:
     os.chdir(folder)
-    {"same": same, "ranks": ranks, "ghosts": ghosts, "memory": memory}[case]()
+    {"same": same, "ranks": ranks, "ghosts": ghosts, "isolated": isolated, "memory": memory}[case]()

@@ -262,8 +262,10 @@ int main(int argc, char** argv) {
     compare("execute", vdi_catalyst_execute(catalyst, step, step), before);
   }
   compare("finalize", vdi_catalyst_finalize(catalyst), before);
-  if (terminations != steps) {
-    std::fprintf(stderr, "FAILED: of %d signals that the script sent, %d came\n", steps,
+  // A script in a separate process sends the signals to that process.
+  const int sent = std::getenv("VDI_ISOLATION") == nullptr ? steps : 0;
+  if (terminations != sent) {
+    std::fprintf(stderr, "FAILED: of %d signals that the script sent, %d came\n", sent,
                  static_cast<int>(terminations));
     ++wrong;
   }

@@ -49,7 +49,8 @@ def catalyst_execute(info):
         other.UpdatePipeline(info.time)
     for name in ("untouched", "partial", "shifted"):
         array = block.GetCellData().GetArray(name)
-        if array is not None and array.GetActualMemorySize() != 0:
+        in_place = "VDI_ISOLATION" not in os.environ  # a separate process has values in order
+        if in_place and array is not None and array.GetActualMemorySize() != 0:
             raise RuntimeError("the filter has copied '%s'" % name)
     if lists(image) != lists(others[compared]):
         raise RuntimeError("the VDI differs from that of values in order")
