@@ -1,5 +1,6 @@
-"""A field in the layouts of real codes: its pictures are the same as those of an array in order, and none of them is copied on
-the host. Arguments: the case (same, ranks, ghosts, isolated, memory), and the program layouts.c with its launcher."""
+"""A field in the layouts of real codes. Its pictures are the same as those of an array in order,
+and the host copies none of the layouts. Arguments: the case (same, ranks, ghosts, isolated, memory),
+and the program layouts.c with its launcher."""
 
 import io
 import json

@@ -1,7 +1,8 @@
 /* Blocks that come, go, move, and change size, spacing and rank at each step. Checks that the memory of the
  * process doesn't grow. Argument: the number of frames. In the folder VDI_OUTPUT each frame's file
- * replaces an older one. The blocks of a step are those of 20 steps before, so a fifth of the frames, in
- * which memory may grow, has the largest frame. VDI_ENDURANCE_FRAMES in the environment replaces the number.
+ * replaces an older one. The blocks of a step are those of 20 steps before. A fifth of the frames,
+ * in which memory may grow, therefore includes the largest frame. VDI_ENDURANCE_FRAMES in the
+ * environment replaces the number.
  */
 #include <math.h>
 #include <mpi.h>
