@@ -70,7 +70,8 @@ class Run:
         self.seconds = time.monotonic() - start
         print(said, told, "%.1f s" % self.seconds, flush=True)
         assert process.returncode == 0, process.returncode
-        self.lines = [line for line in told.splitlines() if line.startswith("vdi_catalyst: ")]
+        # Open MPI 5 sometimes puts a line of the standard error into the standard output.
+        self.lines = [line for line in (told + said).splitlines() if line.startswith("vdi_catalyst: ")]
         self.steps = [[int(word) for word in found] for found in
                       re.findall(r"^step \d+ (\d+) (\d+) (\d+)$", said, re.M)]
         self.codes = [step[0] for step in self.steps]
