@@ -122,6 +122,7 @@ with Screen(1300, 860) as screen, Window(screen, SCRIPT, output=inside.folder) a
     others_wait(window)
     check_answers(window, "another array", lambda: choose_array(window, "temperature"), "temperature", 0.0)
     window.screenshot("3_array.png")
+    check(inside("bar_title()") == "temperature", "the scalar bar names the other array: %s" % inside("bar_title()"))
     check_answers(window, "the undo of another array", lambda: window.click("Undo Apply"), "small", 0.0)
     check_answers(window, "the redo of another array", lambda: window.click("Redo Apply"), "temperature", 0.0)
     check_answers(window, "another time step", lambda: window.click("Next Frame"), "temperature", 1.0)

@@ -64,6 +64,12 @@ def output_now():
             "codes": fields.GetArray("VDI.codes").GetNumberOfTuples() if parameters else 0}
 
 
+def bar_title():
+    """The words beside the VDI's colours."""
+    bar = simple.GetScalarBar(filter_now().LookupTable, simple.GetActiveView())
+    return " ".join(word for word in (bar.Title, bar.ComponentTitle) if word)
+
+
 def fetched():
     """Whether a script gets a VDI."""
     data = simple.servermanager.Fetch(filter_now())

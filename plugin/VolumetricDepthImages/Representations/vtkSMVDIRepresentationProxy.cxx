@@ -4,6 +4,7 @@
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
 #include <vtkPVArrayInformation.h>
+#include <vtkPVDataInformation.h>
 #include <vtkPVTemporalDataInformation.h>
 #include <vtkSMCoreUtilities.h>
 #include <vtkSMOutputPort.h>
@@ -166,6 +167,21 @@ void vtkSMVDIRepresentationProxy::TakeLegend(vtkSMProxy* view) {
   vtkNew<vtkSMTransferFunctionManager> manager;
   manager->HideScalarBarIfNotNeeded(before, view);
   this->SetScalarBarVisibility(view, true);
+  this->NameComponent(legend.Colors);
+}
+
+/// Lets the bars of the map name the component of the filter's array. The view may still show a VDI of
+/// another array, and ParaView calls the component of an array that it can't find "Magnitude".
+void vtkSMVDIRepresentationProxy::NameComponent(vtkSMProxy* colors) {
+  vtkSMProxy* generator = vtkSMVDIGeneratorProxy::SafeDownCast(proxyOf(this, "Input"));
+  if (generator == nullptr) return;
+  const vtkSMPropertyHelper input(generator, "Input");
+  const vtkSMPropertyHelper scalars(generator, "SelectInputScalars");
+  auto* source = vtkSMSourceProxy::SafeDownCast(input.GetAsProxy());
+  if (source == nullptr || scalars.GetNumberOfElements() < 5) return;
+  vtkPVArrayInformation* array = source->GetDataInformation(input.GetOutputPort())
+                                     ->GetArrayInformation(scalars.GetAsString(4), scalars.GetAsInt(3));
+  if (array != nullptr) vtkSMTransferFunctionProxy::UpdateScalarBarsComponentTitle(colors, array);
 }
 
 bool vtkSMVDIRepresentationProxy::RescaleTransferFunctionToDataRangeOverTime(const char* arrayname,

@@ -55,6 +55,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkSMVDIRepresentationProxy
   Legend LegendOfFile(vtkSMProxy* reader);
   void TakeLegend(vtkSMProxy* view);
   void DropLegend();
+  void NameComponent(vtkSMProxy* colors);
   bool HasLegend();
 
   bool TypeIsLinked = false;  // whether the type is linked with the copies in a comparative view
