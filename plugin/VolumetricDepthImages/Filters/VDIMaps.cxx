@@ -79,7 +79,8 @@ bool mayRescale(vtkSMProxy* map) {
 }
 
 vtkSMProxy* proxyIn(vtkSMProxy* owner, const char* property) {
-  const vtkSMPropertyHelper helper(owner, property, true);
+  if (owner == nullptr || owner->GetProperty(property) == nullptr) return nullptr;
+  const vtkSMPropertyHelper helper(owner, property);
   return helper.GetNumberOfElements() > 0 ? helper.GetAsProxy() : nullptr;
 }
 

@@ -13,7 +13,7 @@ bool waitsForRange(vtkSMProxy* function, const char* property);
 int componentNamedBy(vtkSMProxy* map);
 /// Whether ParaView may fit the colour map to the data.
 bool mayRescale(vtkSMProxy* map);
-/// The proxy in that property of `owner`; null if there is none.
+/// The proxy in that property of `owner`; null if there is none, or no owner.
 vtkSMProxy* proxyIn(vtkSMProxy* owner, const char* property);
 
 }  // namespace pv

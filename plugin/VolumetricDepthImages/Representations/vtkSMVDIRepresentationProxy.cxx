@@ -21,6 +21,7 @@
 #include <string_view>
 #include <vector>
 
+#include "VDIMaps.h"
 #include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/Metadata.h"
@@ -31,12 +32,6 @@ vtkStandardNewMacro(vtkSMVDIRepresentationProxy);
 namespace {
 
 constexpr std::string_view ownType = "VDI";
-
-vtkSMProxy* proxyOf(vtkSMProxy* owner, const char* property) {
-  if (owner == nullptr || owner->GetProperty(property) == nullptr) return nullptr;
-  const vtkSMPropertyHelper helper(owner, property);
-  return helper.GetNumberOfElements() > 0 ? helper.GetAsProxy() : nullptr;
-}
 
 /// Gives the maps the file's nodes, in RGB, and keeps ParaView from moving them.
 void setMaps(vtkSMProxy* colors, vtkSMProxy* opacities, const vdi::Coloring& coloring) {
@@ -99,15 +94,15 @@ void vtkSMVDIRepresentationProxy::DropLegend() {
 }
 
 vtkSMVDIRepresentationProxy::Legend vtkSMVDIRepresentationProxy::LegendOfInput() {
-  vtkSMProxy* input = proxyOf(this, "Input");
+  vtkSMProxy* input = pv::proxyIn(this, "Input");
   if (input == nullptr) return {};
   if (vtkSMVDIGeneratorProxy::SafeDownCast(input) == nullptr) return this->LegendOfFile(input);
   const vtkSMPropertyHelper scalars(input, "SelectInputScalars");
   const char* name = scalars.GetNumberOfElements() > 4 ? scalars.GetAsString(4) : nullptr;
-  vtkSMProxy* colors = proxyOf(input, "LookupTable");
+  vtkSMProxy* colors = pv::proxyIn(input, "LookupTable");
   if (name == nullptr || *name == '\0' || colors == nullptr) return {};
-  vtkSMProxy* opacities = proxyOf(input, "ScalarOpacityFunction");
-  return {name, colors, opacities != nullptr ? opacities : proxyOf(colors, "ScalarOpacityFunction")};
+  vtkSMProxy* opacities = pv::proxyIn(input, "ScalarOpacityFunction");
+  return {name, colors, opacities != nullptr ? opacities : pv::proxyIn(colors, "ScalarOpacityFunction")};
 }
 
 vtkSMVDIRepresentationProxy::Legend vtkSMVDIRepresentationProxy::LegendOfFile(vtkSMProxy* reader) {
@@ -148,9 +143,9 @@ void vtkSMVDIRepresentationProxy::TakeLegend(vtkSMProxy* view) {
   vtkSMPropertyHelper array(this, "ColorArrayName");
   vtkSMPropertyHelper colors(this, "LookupTable");
   vtkSMPropertyHelper opacities(this, "ScalarOpacityFunction", true);
-  vtkSMProxy* before = proxyOf(this, "LookupTable");
+  vtkSMProxy* before = pv::proxyIn(this, "LookupTable");
   const char* name = array.GetInputArrayNameToProcess();
-  if (before == legend.Colors && proxyOf(this, "ScalarOpacityFunction") == legend.Opacities &&
+  if (before == legend.Colors && pv::proxyIn(this, "ScalarOpacityFunction") == legend.Opacities &&
       name != nullptr && legend.Array == name && array.GetInputArrayAssociation() == vtkDataObject::FIELD)
     return;
   const bool hadBar =
@@ -173,7 +168,7 @@ void vtkSMVDIRepresentationProxy::TakeLegend(vtkSMProxy* view) {
 /// Lets the bars of the map name the component of the filter's array. The view may still show a VDI of
 /// another array, and ParaView calls the component of an array that it can't find "Magnitude".
 void vtkSMVDIRepresentationProxy::NameComponent(vtkSMProxy* colors) {
-  vtkSMProxy* generator = vtkSMVDIGeneratorProxy::SafeDownCast(proxyOf(this, "Input"));
+  vtkSMProxy* generator = vtkSMVDIGeneratorProxy::SafeDownCast(pv::proxyIn(this, "Input"));
   if (generator == nullptr) return;
   const vtkSMPropertyHelper input(generator, "Input");
   const vtkSMPropertyHelper scalars(generator, "SelectInputScalars");
@@ -186,7 +181,7 @@ void vtkSMVDIRepresentationProxy::NameComponent(vtkSMProxy* colors) {
 
 bool vtkSMVDIRepresentationProxy::RescaleTransferFunctionToDataRangeOverTime(const char* arrayname,
                                                                              int attribute_type) {
-  vtkSMProxy* generator = vtkSMVDIGeneratorProxy::SafeDownCast(proxyOf(this, "Input"));
+  vtkSMProxy* generator = vtkSMVDIGeneratorProxy::SafeDownCast(pv::proxyIn(this, "Input"));
   if (generator == nullptr || !this->HasLegend())
     return this->Superclass::RescaleTransferFunctionToDataRangeOverTime(arrayname, attribute_type);
   const vtkSMPropertyHelper input(generator, "Input");
@@ -207,8 +202,8 @@ bool vtkSMVDIRepresentationProxy::RescaleTransferFunctionToDataRangeOverTime(con
   }
   if (!(range[0] <= range[1])) return false;
   vtkSMCoreUtilities::AdjustRange(range);
-  vtkSMTransferFunctionProxy::RescaleTransferFunction(proxyOf(this, "LookupTable"), range);
-  vtkSMTransferFunctionProxy::RescaleTransferFunction(proxyOf(this, "ScalarOpacityFunction"), range);
+  vtkSMTransferFunctionProxy::RescaleTransferFunction(pv::proxyIn(this, "LookupTable"), range);
+  vtkSMTransferFunctionProxy::RescaleTransferFunction(pv::proxyIn(this, "ScalarOpacityFunction"), range);
   return true;
 }
 
