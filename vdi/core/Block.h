@@ -55,7 +55,8 @@ class ComputedValues {
 /// One axis-aligned lattice of scalars. Values are interpolated trilinearly between lattice points and
 /// clamped beyond the outermost ones. `owned` says which samples belong to this block. The owned boxes of all
 /// blocks of all ranks must not overlap (they are half-open, so touching is fine), unless their spacings
-/// differ: then the finest block owns the common part. comm/GhostExchange.h establishes both.
+/// differ: then the finest block owns the common part. VdiGenerator::setBlocks establishes both. It throws
+/// Error{InvalidArgument} on all ranks if blocks of one spacing overlap by more than 1e-3 of it.
 ///
 /// A block has values at the indices [-extra.lo, dims + extra.hi): the stored ones and the layers around
 /// them. Patches cover all of these layers, and may cover stored values too. A patch overrides the stored

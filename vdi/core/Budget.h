@@ -28,8 +28,8 @@ constexpr std::uint32_t maxPerList(std::uint32_t supersegments, Budget budget) {
 
 /// The demand of all lists, counted before Budget::Total allocates: the number of supersegments that they
 /// would have at each of several levels of coarseness. Level 0 keeps every sample, the last level leaves one
-/// supersegment per list, and the levels between are the tolerances of merging (vdi/reference/Segmenter.h).
-/// The histogram of a picture is the sum of those of its parts.
+/// supersegment per list, and the levels between are the tolerances that Algorithm::Merge tries. The
+/// histogram of a picture is the sum of those of its parts.
 struct SupersegmentHistogram {
   static constexpr std::size_t levels = 10;
   std::array<std::uint64_t, levels> supersegments{};  // each list limited to maxPerList

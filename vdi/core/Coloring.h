@@ -14,7 +14,9 @@ struct ScalarArray {
   std::string name;    // UTF-8; empty when unknown
   bool cells = false;  // cell data; else point data
   int components = 1;  // number in the array, >= 1
-  int component = 0;   // the one shown, < components; or magnitude, or phase (ComponentValues.h)
+  /// The one shown, from 0 to below `components`; or -1: the magnitude of all; or, of two components, real
+  /// and imaginary, -2: the phase, from -pi to pi.
+  int component = 0;
   bool operator==(const ScalarArray&) const = default;
 };
 

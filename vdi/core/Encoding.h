@@ -18,7 +18,7 @@ struct EncodingOf;
 
 template <>
 struct EncodingOf<Supersegment> {
-  /// The encoding's number: in a file's header, and in the shaders' constant `encoding` (store.glsl).
+  /// The encoding's number: in a file's header, and in the shaders' constant `encoding`.
   static constexpr Precision precision = Precision::Full;
   static constexpr bool hasDepthCode = false;
   static constexpr std::size_t chunkBytes = 24;     // size of a supersegment in a file's chunk, before LZ4

@@ -9,7 +9,7 @@
 namespace vdi {
 
 enum class ErrorCode {
-  InvalidArgument,    // the caller passed an unusable value, such as N_S = 0 or a mismatch between ranks
+  InvalidArgument,    // the caller passed an unusable value, or ranks passed different ones
   DeviceUnavailable,  // no Vulkan device fits; the message lists every device and why it was refused
   OutOfMemory,        // the device or the host cannot hold the data; the message gives the sizes
   DeviceFailure,      // a Vulkan call failed

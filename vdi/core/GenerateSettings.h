@@ -29,18 +29,21 @@ constexpr double maxMargin = 4.0;
 
 constexpr double automaticRate = 0.0;
 
+/// The functions of VdiGenerator throw Error{InvalidArgument} for values outside the ranges given here.
 struct GenerateSettings {
-  int width = 1280;
-  int height = 720;
+  int width = 1280;  // of the picture, in pixels, 1 .. View::maxSide; the margin is extra
+  int height = 720;  // likewise
   /// Extent of the margin in [0, maxMargin]: beyond the left and right edges as a share of the picture's
-  /// width, and beyond the lower and upper edges as a share of its height. marginOf (Margin.h) limits it to
-  /// the visible scene.
+  /// width, and beyond the lower and upper edges as a share of its height. Vdi::margin is smaller if the
+  /// scene's box ends earlier, or if the picture's samples would else not be slabs (samplesAreSlabs).
   double margin = 0.0;
   std::uint32_t supersegments = 25;  // N_S, 1 .. maxSupersegments
   /// Total: lists have N_S on average, if they have that many samples; needs Algorithm::Merge.
   Budget budget = Budget::List;
   double fill = 1.0;  // (0, 1]; with Budget::Total, the share to make of N_S supersegments per list
-  /// [1/64, 64]; or automaticRate: 1, 2 or 4, as the transfer function needs on the volume (SamplingRate.h).
+  /// Samples per smallest spacing of the scene, along the view axis: [1/64, 64]; or automaticRate: 1, 2 or 4,
+  /// as the transfer function needs on the volume. automaticRate is the default of ParaView's filter and of
+  /// JSON runs, but not of this struct.
   double samplesPerVoxel = 1.0;
   Algorithm algorithm = Algorithm::Merge;
   /// If rays have more samples than depthCodeFor can number, the VDI has full precision regardless.

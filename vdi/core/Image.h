@@ -18,7 +18,7 @@ struct Image {
   int height = 0;
   HostVector<glm::vec4> rgba;  // [height][width], premultiplied
   /// [height][width]: view-space depth of the front of the first sample or supersegment that is not
-  /// transparent, world units; noDepth where all are transparent. May be empty if no depth was requested.
+  /// transparent, world units; noDepth where all are transparent.
   HostVector<float> depth;
 
   static constexpr float noDepth = std::numeric_limits<float>::infinity();

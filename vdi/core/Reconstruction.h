@@ -12,9 +12,8 @@ enum class Reconstruction : std::uint32_t {
   /// two lists by the ray's distance from their centres. V_O's own picture is the same as with Constant. More
   /// accurate, but reads more.
   Smooth = 1,
-  /// Like Smooth, but the faces of supersegments slope as the lists around them suggest
-  /// (vdi/reference/Slopes.h), so that surfaces keep their place between lists. V_O's own picture is the
-  /// same. The most accurate and slowest.
+  /// Like Smooth, but the faces of supersegments slope as the lists around them suggest, so that surfaces
+  /// keep their place between lists. V_O's own picture is the same. The most accurate and slowest.
   Sheared = 2,
 };
 

@@ -1,4 +1,5 @@
-// The types of scalars that a block may hold.
+// The types of scalars that a block may hold. There are no 64-bit integers among them: these come in only
+// through vdi_catalyst.h, its Fortran and Python twins, and ParaView's data sets.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +9,7 @@
 
 namespace vdi {
 
-/// The enumerators index the table of names in Block.cpp.
+/// The enumerators index tables.
 enum class ScalarType : std::uint32_t {
   U8 = 0,
   I8 = 1,

@@ -10,7 +10,7 @@
 
 namespace vdi {
 
-/// Extent of the data of all ranks. `localScene` gives one rank's part; comm::globalScene combines them.
+/// Extent of the data of all ranks. `localScene` gives one rank's part; VdiGenerator::scene gives the whole.
 struct Scene {
   Box bounds;               // union of the owned boxes; empty if no rank has a block
   double minSpacing = 0.0;  // smallest spacing of any block and axis; 0 without blocks

@@ -42,8 +42,7 @@ struct Shading {
 /// A difference smaller than this share of two values counts as rounding error.
 inline constexpr double leastGradient = 1e-6;
 
-/// If shading is on, throws Error{InvalidArgument} for lights that are not valid. The table of settings
-/// checks the rest.
+/// If shading is on, throws Error{InvalidArgument} for lights that are not valid. Checks nothing else.
 void validate(const Shading& shading);
 
 /// Unit vector in world space; zero for a light at the eye.

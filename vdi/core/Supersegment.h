@@ -38,7 +38,7 @@ static_assert(sizeof(Supersegment) == 24);
 
 /// A supersegment in 8 bytes. Depths are codes of a DepthCode; the colour is straight, 8 bits a channel; the
 /// optical depth has 12 bits, see opticalDepthOfCode. The encoder of a list carries each supersegment's
-/// rounding error over to the next one (reference/Compaction.h), so errors do not add up along the list.
+/// rounding error over to the next one, so errors do not add up along the list.
 struct CompactSupersegment {
   std::uint32_t depths = 0;    // bits 0 - 13 front, 14 - 27 back, 28 - 31 low bits of the optical depth
   std::uint32_t material = 0;  // bits 0 - 7 red, 8 - 15 green, 16 - 23 blue, 24 - 31 its remaining bits

@@ -1,4 +1,9 @@
-// The VDI itself (paper, sections 2.4 and 4).
+// The VDI itself (paper, sections 2.4 and 4). All headers use these terms:
+//   * the paper: A. Gupta et al., Parallel Compositing of Volumetric Depth Images for Interactive
+//     Visualization of Distributed Volumes at High Frame Rates, EGPGV 2023;
+//   * V_O: the original viewpoint, from which a VDI is made; V_N: any other, from which it is rendered;
+//   * list: the supersegments of one pixel of V_O, front to back;
+//   * N_S: GenerateSettings::supersegments, by which Budget bounds the supersegments of lists.
 #pragma once
 
 #include <cstdint>
@@ -25,8 +30,8 @@ struct Vdi {
   /// have the picture's spacing.
   glm::ivec2 margin{0};
   std::uint32_t budget = 0;  // the most that a list may hold: N_S, or maxPerList
-  Box bounds;                // the scene's box, world
-  double sampleStep = 0.0;   // depth interval of one sample (DepthLattice::step)
+  Box bounds;                // world; the scene's box, cropped if the settings' region has a box
+  double sampleStep = 0.0;   // depth interval of one sample (DepthLattice::step), world units
   double time = 0.0;         // simulation time, 0 when unknown
   std::uint64_t timeStep = 0;
   std::optional<Coloring> coloring;  // meaning of the colours, if known
@@ -58,7 +63,8 @@ struct Vdi {
 /// values, 0 <= front < back, ascending and disjoint, opacity in (0, 1]; and compact lists have a depth code
 /// with positive step.
 void validate(const Vdi& vdi);
-/// Checks everything but the lists: size, precision and depth code.
+/// Checks everything but the lists: size, precision and depth code. This and the next two throw
+/// Error{Format}, too.
 void validateShape(const Vdi& vdi);
 /// Checks that there are width * height lists, and that the number of supersegments matches their offsets.
 void validateEnds(const Vdi& vdi);

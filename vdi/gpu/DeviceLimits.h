@@ -21,8 +21,8 @@ struct DeviceLimits {
   std::uint32_t timestampBits = 0;  // number of valid low bits; the clock wraps around
   /// Required alignment of the start and the size of imported host memory; 0: the device cannot import any.
   std::uint64_t hostPointerAlignment = 0;
-  /// Invocations of a subgroup, for compute shaders that need subgroup votes and sums and exactly that size
-  /// (ComputePipelineInfo::wholeSubgroups), 32 at most. 0 if the device does not support this.
+  /// Invocations of a subgroup, for compute shaders that need subgroup votes and sums and exactly that size,
+  /// 32 at most. 0 if the device does not support this.
   std::uint32_t subgroupSize = 0;
   // Features that are enabled if the device has them.
   bool shaderFloat16 = false;

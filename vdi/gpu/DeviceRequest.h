@@ -26,8 +26,9 @@ struct DeviceRequest {
   std::string cacheFolder;
 };
 
-/// The request from the environment: VDI_DEVICE is the selector, VDI_VALIDATION=1 enables validation, and
-/// VDI_CACHE is the cache's folder.
+/// The request from this process's environment: VDI_DEVICE is the selector, VDI_VALIDATION=1 enables
+/// validation, and VDI_CACHE is the cache's folder ("off": none; unset: pv-vdi in the user's folder for
+/// caches). Throws Error{InvalidArgument} if VDI_VALIDATION is neither 0 nor 1. Not collective.
 DeviceRequest requestFromEnvironment(int localRank);
 
 }  // namespace vdi::gpu

@@ -1,4 +1,4 @@
-// The .vdi file. docs/format.md has the byte map; static_asserts in VdiLayout.h guard it.
+// The .vdi file. docs/format.md has the byte map. No function here is collective.
 #pragma once
 
 #include <cstddef>
@@ -34,19 +34,21 @@ std::optional<std::vector<std::byte>> encodeWhile(const Vdi& vdi, const std::fun
 /// header or chunk table asks for more memory than the chunks can expand to (checked before allocation; they
 /// expand at most 255 times). The result has passed validate(Vdi).
 Vdi decode(std::span<const std::byte> bytes);
-/// Equals thinned(decode(bytes), factor) for each of the factors (vdi/core/Thinning.h), and throws as decode
-/// does, also for faults outside the lists that are kept. Needs memory for the result only. Each factor is at
-/// least 1.
+/// Decodes a VDI for each of the factors, which are at least 1. It keeps about one list in `factor` of each
+/// row and of each column, unchanged. Throws as decode does, also for faults outside the lists that are kept.
+/// Needs memory for the result only.
 std::vector<Vdi> decodeThinned(std::span<const std::byte> bytes, const std::vector<int>& factors);
-/// Reads header, chunk table and metadata only; the lists must be present, but need not be valid.
+/// Reads header, chunk table and metadata only; the lists must be present, but need not be valid. Throws
+/// Error{Format} for faults of these parts.
 VdiFileInfo decodeInfo(std::span<const std::byte> bytes);
 
-/// Writes the file by writeAtomically (Files.h): a reader never sees half a file, and an existing file stays
-/// if writing fails. Throws Error{Io}, or Error{Format} as encode; both with the path as context.
+/// Writes the file atomically: a reader never sees half a file, and an existing file stays if writing fails.
+/// Throws Error{Io}, or Error{Format} as encode; both with the path as context.
 void writeVdi(const std::filesystem::path& path, const Vdi& vdi);
 /// Throws Error{Io} or Error{Format} with the path as context.
 Vdi readVdi(const std::filesystem::path& path);
-/// decodeInfo of a file, without reading the lists.
+/// decodeInfo of a file, without reading the lists. Throws Error{Io} or Error{Format} with the path as
+/// context.
 VdiFileInfo readVdiInfo(const std::filesystem::path& path);
 
 }  // namespace vdi::io

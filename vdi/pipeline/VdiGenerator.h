@@ -40,11 +40,17 @@ class VdiFrame {
   std::shared_ptr<State> state_;
 };
 
-/// Makes VDIs of distributed volumes. Every function is collective: each rank of the communicator has a
-/// generator with its own device, and calls the same functions in the same order. When a call throws, it
-/// throws on every rank (Communicator::together), and the object stays usable.
+/// Makes VDIs of distributed volumes. Each rank of the communicator has a generator with its own device. All
+/// functions but the const ones are collective, constructor and destructor included: each rank calls the same
+/// ones in the same order, from one thread at a time. When a call throws, it throws on every rank. If only
+/// some ranks fail, they throw their own errors, and the others Error{RemoteRank}. The object stays usable
+/// unless the device is lost (Device::isLost).
+///
+/// Any of these functions may throw Error{OutOfMemory}, Error{DeviceFailure} or Error{Communication}.
 class VdiGenerator {
  public:
+  /// Keeps `device` alive, which is not null, and takes `comm`. Reads no environment variables; for those,
+  /// pass requestFromEnvironment to Device::create, and generatorOptionsFromEnvironment here.
   VdiGenerator(std::shared_ptr<gpu::Device> device, comm::Communicator comm,
                const GeneratorOptions& options = {});
   ~VdiGenerator();
@@ -54,8 +60,9 @@ class VdiGenerator {
   VdiGenerator& operator=(VdiGenerator&&) = delete;
 
   /// Sets this rank's blocks, which may be none; copies the scalars to the device before it returns.
-  /// `fillGhosts` first exchanges missing layers (comm/GhostExchange.h). Blocks of the same shapes reuse
-  /// device memory. After a throw, no blocks are set.
+  /// `fillGhosts` first fetches the layers around blocks from their neighbours, of any rank. Blocks of the
+  /// same shapes reuse device memory. Throws Error{InvalidArgument} for blocks that validate(blocks) rejects,
+  /// that overlap, or whose values are all too small for the device. After a throw, no blocks are set.
   void setBlocks(std::vector<Block> blocks, bool fillGhosts = true);
 
   /// Starts to send the next time step's blocks to the device and returns, so that they arrive while frames
@@ -76,6 +83,12 @@ class VdiGenerator {
   /// the array and adds it. Camera, transfer function and settings must be equal on all ranks (otherwise all
   /// throw Error{InvalidArgument}). A scene that is empty or out of sight gives a VDI with empty lists.
   /// Devices write to the VDI's memory; once it is freed, the next frame reuses it.
+  ///
+  /// All functions that make frames throw Error{InvalidArgument} also for settings, transfer functions and
+  /// cameras that are invalid, for blend modes other than Composite (renderVolume has all), for rays of too
+  /// many samples (depthLattice), for a camera so far away that floats can't tell samples apart, and for f64
+  /// values whose range is too large for the transfer function's. They throw Error{Cancelled} if a rank's
+  /// `progress` returned false.
   std::optional<Vdi> generate(const Camera& camera, const TransferFunction& transferFunction,
                               const GenerateSettings& settings, const Progress& progress = {});
 
@@ -101,7 +114,7 @@ class VdiGenerator {
   /// the frame was moved from, another generator started it, or its generator no longer exists.
   std::optional<Vdi> finish(VdiFrame frame);
 
-  /// Writes the VDI of generate to a file (io/VdiFile.h). Each rank encodes and writes its own lists: no rank
+  /// Writes the VDI of generate to a file (VdiFile.h). Each rank encodes and writes its own lists: no rank
   /// ever has the whole VDI, and a rank's host memory is bounded by its own lists. Ranks whose host lacks the
   /// folder send their encoded lists to rank 0, which holds one chunk of them at a time. The file equals that
   /// of io::writeVdi byte for byte. No reader sees an incomplete file, and if any rank fails, the old file
@@ -119,13 +132,14 @@ class VdiGenerator {
   void show(VdiRenderer* renderer, const Camera& camera, const TransferFunction& transferFunction,
             const GenerateSettings& settings, const Progress& progress = {});
 
-  /// Plain ray casting of the distributed volume through the same samples: the ground truth, on rank 0.
-  /// Ignores the settings' supersegments, algorithm and margin. Supports all blend modes; the functions that
-  /// make VDIs throw Error{InvalidArgument} unless the mode is Composite.
+  /// Plain ray casting of the distributed volume through the same samples: the ground truth. Returns a
+  /// picture of the settings' width x height, premultiplied RGBA with depth, on rank 0, nullopt on the
+  /// others. Ignores the settings' supersegments, algorithm and margin, and supports all blend modes.
   std::optional<Image> renderVolume(const Camera& camera, const TransferFunction& transferFunction,
                                     const GenerateSettings& settings, const Progress& progress = {});
 
-  /// Reports of the last generate, finish or renderVolume: all ranks' on rank 0, none on the others.
+  /// Reports of the last frame that was completed, by any of these functions: on rank 0 all ranks', by rank;
+  /// none on the others, and none before the first frame.
   const std::vector<RankReport>& reports() const;
   const gpu::Device& device() const;
   const comm::Communicator& communicator() const;
