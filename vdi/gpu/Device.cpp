@@ -1,7 +1,6 @@
 #include "vdi/gpu/Device.h"
 
 #include <algorithm>
-#include <atomic>
 #include <utility>
 
 #include "vdi/gpu/DeviceCandidate.h"
@@ -42,7 +41,6 @@ struct Device::State {
   VulkanDevice vulkan;
   bool cpu;
   bool gpuPrograms;
-  std::atomic<std::int64_t> allocated{0};
 };
 
 std::string Device::describeAll() {
@@ -73,10 +71,7 @@ bool Device::isLost() const {
   return state_->vulkan.isLost();
 }
 std::uint64_t Device::allocatedBytes() const {
-  return static_cast<std::uint64_t>(state_->allocated.load());
-}
-void Device::accountAllocation(std::int64_t bytes) {
-  state_->allocated += bytes;
+  return state_->vulkan.allocatedBytes();
 }
 std::uint32_t Device::validationMessageCount() const {
   return state_->instance.messages().count();

@@ -1,5 +1,5 @@
-// A compute device, through Vulkan. Everything else in vdi/gpu is made from it and keeps it alive. This
-// header needs no Vulkan header.
+// A compute device, through Vulkan. Generators, renderers and everything else made from it keep it alive.
+// This header needs no Vulkan header.
 #pragma once
 
 #include <cstdint>
@@ -40,16 +40,15 @@ class Device {
   /// Whether the device was lost. It stays lost: create another one.
   bool isLost() const;
 
-  /// Bytes of device memory that Buffers and Images of this device hold.
+  /// Bytes of device memory that this device's users hold.
   std::uint64_t allocatedBytes() const;
-  void accountAllocation(std::int64_t bytes);
 
   /// Number of validation messages so far, and the text of the latest ones (64 KiB); 0 and empty without
   /// validation.
   std::uint32_t validationMessageCount() const;
   std::string validationMessages() const;
 
-  /// For the rest of vdi/gpu.
+  /// For the library's own code: no installed header has the type.
   VulkanDevice& vulkan() const;
 
  private:

@@ -50,7 +50,7 @@ VkDeviceMemory allocate(Device& device, const VkMemoryRequirements& needs, std::
   VkDeviceMemory memory = VK_NULL_HANDLE;
   requireRoom(vkAllocateMemory(device.vulkan().handle(), &info, nullptr, &memory), "vkAllocateMemory", device,
               needs.size, what);
-  device.accountAllocation(static_cast<std::int64_t>(needs.size));
+  device.vulkan().accountAllocation(static_cast<std::int64_t>(needs.size));
   return memory;
 }
 
@@ -250,7 +250,7 @@ void Buffer::release() noexcept {
   if (!device_) return;
   if (buffer_ != VK_NULL_HANDLE) vkDestroyBuffer(device_->vulkan().handle(), buffer_, nullptr);
   if (memory_ != VK_NULL_HANDLE) vkFreeMemory(device_->vulkan().handle(), memory_, nullptr);
-  device_->accountAllocation(-static_cast<std::int64_t>(allocated_));
+  device_->vulkan().accountAllocation(-static_cast<std::int64_t>(allocated_));
   buffer_ = VK_NULL_HANDLE;
   memory_ = VK_NULL_HANDLE;
   size_ = 0;
@@ -346,7 +346,7 @@ void SampledImage::release() noexcept {
   if (view_ != VK_NULL_HANDLE) vkDestroyImageView(device_->vulkan().handle(), view_, nullptr);
   if (image_ != VK_NULL_HANDLE) vkDestroyImage(device_->vulkan().handle(), image_, nullptr);
   if (memory_ != VK_NULL_HANDLE) vkFreeMemory(device_->vulkan().handle(), memory_, nullptr);
-  device_->accountAllocation(-static_cast<std::int64_t>(allocated_));
+  device_->vulkan().accountAllocation(-static_cast<std::int64_t>(allocated_));
   view_ = VK_NULL_HANDLE;
   image_ = VK_NULL_HANDLE;
   memory_ = VK_NULL_HANDLE;

@@ -51,6 +51,10 @@ class VulkanDevice {
   /// can be imported; 0: none.
   std::uint32_t memoryTypesOfHostPointer(const void* pages) const;
 
+  /// Counts device memory that was allocated (bytes > 0) or freed (bytes < 0). Thread-safe.
+  void accountAllocation(std::int64_t bytes) { allocated_ += bytes; }
+  std::uint64_t allocatedBytes() const { return static_cast<std::uint64_t>(allocated_.load()); }
+
   /// Submits to a queue and returns its number of submissions, including this one. Its timeline semaphore
   /// reaches that number when this submission is complete. Thread-safe.
   std::uint64_t submit(QueueKind kind, std::span<const VkSemaphoreSubmitInfo> waits,
@@ -93,6 +97,7 @@ class VulkanDevice {
   std::array<Queue, 2> queues_;  // by kind
   std::mutex queueMutex_;
   mutable std::atomic<bool> lost_ = false;
+  std::atomic<std::int64_t> allocated_ = 0;
   PipelineCacheFile cacheFile_;
   std::size_t cachedBytes_ = 0;  // size of the file's data
   VkPipelineCache cache_ = VK_NULL_HANDLE;

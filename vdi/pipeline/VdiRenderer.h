@@ -18,7 +18,12 @@ namespace detail {
 class VdiSink;
 }
 
-/// Renders a VDI from anywhere, on one device. Not collective.
+class VdiGenerator;
+
+/// Renders a VDI from anywhere, on one device, which it keeps alive. Not collective. One thread at a time
+/// calls a renderer, except for prepareVdi and compile. Pictures are [height][width], row 0 at the bottom;
+/// their depths, and `ends`, are depths in the rendering camera's view space (Camera.h), in world units.
+/// Functions that use the device throw Error{OutOfMemory} or Error{DeviceFailure}.
 class VdiRenderer {
  public:
   explicit VdiRenderer(std::shared_ptr<gpu::Device> device);
@@ -28,9 +33,9 @@ class VdiRenderer {
   VdiRenderer(VdiRenderer&&) = delete;
   VdiRenderer& operator=(VdiRenderer&&) = delete;
 
-  /// Copies the VDI; `vdi` is not needed afterwards. The device goes on with upload and set-up after this
-  /// returns, and the next render waits for them (for VDIs of up to 128 MiB; larger ones wait for all but
-  /// their last part).
+  /// Copies the VDI, which validate(Vdi) must accept; `vdi` is not needed afterwards. The device goes on with
+  /// upload and set-up after this returns, and the next render waits for them (for VDIs of up to 128 MiB;
+  /// larger ones wait for all but their last part). After a throw, there may be no VDI.
   void setVdi(const Vdi& vdi);
   /// Double buffering: copies the VDI into buffers of its own, while renders go on with the current VDI. Call
   /// from any one thread, but not during setVdi, showPrepared or another prepareVdi. Returns when the VDI is
@@ -48,12 +53,13 @@ class VdiRenderer {
   Image render(const Camera& camera, int width, int height,
                Reconstruction reconstruction = defaultReconstruction);
   /// Renders for a screen: downloads 8 instead of 20 bytes per pixel, since the download takes longer than
-  /// rendering. With Alpha::Premultiplied, each byte is toByte of the value that render gives. Valid until
-  /// the next call.
+  /// rendering. With Alpha::Premultiplied, each byte is toByte of the value that render gives. The renderer
+  /// owns the memory of the picture, which is valid until its next render or renderBytes. Throws as render.
   ImageBytes renderBytes(const Camera& camera, int width, int height, Alpha alpha,
                          Reconstruction reconstruction = defaultReconstruction);
   /// Renders among opaque objects. `ends` has the depths at which the view's rays end, [height][width]:
-  /// infinity where no object is hit, empty if there are no objects.
+  /// infinity where no object is hit, empty if there are no objects. Throws Error{InvalidArgument} before the
+  /// first setVdi.
   Image render(const View& view, std::span<const float> ends,
                Reconstruction reconstruction = defaultReconstruction);
   ImageBytes renderBytes(const View& view, std::span<const float> ends, Alpha alpha,
@@ -63,11 +69,12 @@ class VdiRenderer {
   void compile(Reconstruction reconstruction) const;
   double renderMilliseconds() const;  // device time of the last render
 
+ private:
+  friend class VdiGenerator;
   /// For VdiGenerator::show: a sink that shows lists made on the renderer's own device, without a detour
   /// through the host. Null for another device. The renderer must outlive the sink.
   std::unique_ptr<detail::VdiSink> sinkFor(const gpu::Device& device);
 
- private:
   struct State;
   std::unique_ptr<State> state_;
 };
