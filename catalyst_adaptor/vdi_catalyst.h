@@ -19,11 +19,15 @@
  * VDI_CATALYST_OK or a code below, the same one on all ranks, and rank 0 prints a message to standard error.
  * Rank 0 prints a repeated message in full only once. A step that fails again gets one line, because its
  * files are missing. After an error, the next step works again, with the blocks and arrays from before.
- * Values are used where they are: pointers must stay valid, and their data unchanged, until
- * vdi_catalyst_execute returns. The host holds copies of only the layers beside blocks, and of whole blocks
- * if the blocks' scalar types differ. Arrays made of particles take 4 bytes per cell.
  *
- * Scripts are Catalyst scripts of version 2 (paraview.catalyst). They find the blocks, a
+ * Calls copy structures, names, strides and arrays of pointers: these may go when the call returns. Calls
+ * borrow the values of arrays, and particles' positions, weights and lengths: vdi_catalyst_execute reads them
+ * where they are, so they must stay valid and unchanged until it returns. The host holds copies of only the
+ * layers beside blocks, and of whole blocks if the blocks' scalar types differ. Arrays made of particles take
+ * 4 bytes per cell.
+ *
+ * Scripts are Catalyst scripts: Python files for ParaView's module paraview.catalyst. (Catalyst 2, Kitware's
+ * C interface, is another way to hand over data: docs/catalyst-guide.md.) They find the blocks, a
  * vtkPartitionedDataSet with one vtkImageData per block, under the name "grid":
  * TrivialProducer(registrationName="grid"). A script runs on all ranks, and updates of a pipeline are
  * collective. If one rank's script ends or fails before an update of VolumetricDepthImage that the others
@@ -69,11 +73,14 @@ extern "C" {
 enum {
   VDI_CATALYST_OK = 0,
   VDI_CATALYST_BAD_ARGUMENT = 1, /* a null pointer or a finalized handle, a size below 1 or too large to
-                                  * count, an unknown type, arrays before blocks, an offset beyond half a
-                                  * cell, a step that is no int, a time that isn't finite */
-  VDI_CATALYST_ENGINE = 2, /* ParaView can't be loaded or started, or was started before in this process; the
-                            * processes that make the frames can't be started, or have died */
-  VDI_CATALYST_SCRIPT = 3  /* a script, or a filter or extractor in it, failed; the others went on */
+                                  * count, an unknown type, arrays or a step before blocks, an offset beyond
+                                  * half a cell, a step below 0 or (with scripts) above INT32_MAX, steps
+                                  * that differ between ranks, a time that isn't finite */
+  VDI_CATALYST_ENGINE = 2, /* ParaView can't be loaded or started, or was started before in this process; a
+                            * JSON run finds no Vulkan device, or another JSON run goes on; the processes
+                            * that make the frames can't be started, or have died */
+  VDI_CATALYST_SCRIPT = 3  /* a script, or a filter or extractor in it, failed; the others went on. JSON: the
+                            * text or a file that it names is wrong, or a frame couldn't be made or written */
 };
 
 /* Scalar types. */
@@ -93,9 +100,11 @@ enum {
 /* Associations of values. */
 enum { VDI_CATALYST_POINTS = 0, VDI_CATALYST_CELLS = 1 };
 
-/* One block of a uniform lattice. `cells` counts cells per axis, ghost cells included; point arrays have one
- * value more per axis. `origin` is the lower corner of the first cell, ghost or not. Values lie x fastest,
- * then y, then z.
+/* One block of a uniform lattice. `cells` counts cells per axis, ghost cells included, and is at least 1;
+ * point arrays have one value more per axis. `origin` is the lower corner of the first cell, ghost or not,
+ * and so the position of the first point, in world units. `spacing` is the size of a cell in world units,
+ * above 0; for a VDI, it lies in 1e-30 .. 1e30, and the block within 1e12 spacings of 0. Values lie x
+ * fastest, then y, then z.
  *
  * Neighbours are blocks of any rank and any spacing. They may share the points of their common face, or end
  * one cell apart (points), or meet at a face (cells). Ranks exchange the values that a block needs of its
@@ -147,8 +156,8 @@ VDI_CATALYST_API int vdi_catalyst_initialize_pipelines(int32_t fortran_communica
 
 /* Replaces vdi_catalyst_initialize in runs without scripts, ParaView or Python, which a JSON text describes.
  * `json` is the text, or the name of a file with it. The first rank's text counts, and that rank alone reads
- * files. "{\"field\": \"V\", \"every\": 10}" writes vdi_000010.vdi and so on from the array V.
- * docs/vdi-run.schema.json has all fields; `vdi check FILE` finds mistakes before the run.
+ * files. "{\"field\": \"V\", \"every\": 10}" writes vdi_000000.vdi, vdi_000010.vdi and so on from the array
+ * V. docs/vdi-run.schema.json has all fields; `vdi check FILE` finds mistakes before the run.
  *
  * The other functions are the same, with these differences: a step may be any number from 0 on, blocks with
  * ghost layers take no more memory than others, and a frame that fails is VDI_CATALYST_SCRIPT. For a mistake
@@ -274,9 +283,12 @@ VDI_CATALYST_API int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const ch
  * vdi_catalyst_execute refuses. */
 VDI_CATALYST_API int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time);
 
-/* Runs the scripts on the blocks as they are now. `step` is the same on all ranks, from 0 to INT32_MAX,
- * because ParaView counts and names files by such numbers. Other steps are VDI_CATALYST_BAD_ARGUMENT each
- * time, and so are times that aren't finite. */
+/* Makes what the scripts or the JSON text ask for at this step, of the blocks, arrays and particles as they
+ * are now. `step` is the same on all ranks, and at least 0. With scripts it is at most INT32_MAX, because
+ * ParaView counts and names files by such numbers. `time` is the simulation's, in any unit. Returns
+ * VDI_CATALYST_BAD_ARGUMENT for other steps, times that aren't finite, and before vdi_catalyst_set_blocks,
+ * VDI_CATALYST_SCRIPT if a script or a frame fails, and VDI_CATALYST_ENGINE if ParaView can't have the blocks
+ * or the frames' processes have died. */
 VDI_CATALYST_API int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time);
 
 /* A number that viewers may change while the simulation runs, if a script lets them (VDIStream's Steer) or a
@@ -301,8 +313,9 @@ VDI_CATALYST_API int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, cons
  * to the process that began it. */
 VDI_CATALYST_API int vdi_catalyst_finalize(vdi_catalyst* catalyst);
 
-/* The text of the last error on this rank; "" if there was none, or if a parameter was asked for since then.
- * It is valid until the next call. */
+/* The text of the last error on this rank; "" if there was none, if a parameter was asked for since then, and
+ * for a null or finalized handle. Not collective. The engine owns the text, which is valid until the next
+ * call. */
 VDI_CATALYST_API const char* vdi_catalyst_error(const vdi_catalyst* catalyst);
 
 #ifdef __cplusplus

@@ -46,7 +46,8 @@ class CatalystError(RuntimeError):
 @dataclasses.dataclass
 class Block:
     """One block of a uniform lattice; each field has x, y and z. `cells` counts ghost cells too; `origin` is the lower corner
-    of the first cell, ghost or not."""
+    of the first cell, ghost or not, and so the position of the first point; `spacing` is the size of a cell. Both are in world
+    units."""
 
     cells: tuple
     origin: tuple = (0.0, 0.0, 0.0)
@@ -259,8 +260,8 @@ class Catalyst:
         return self._library.vdi_catalyst_wants(self._handle, step, time) != 0
 
     def execute(self, step, time=0.0):
-        """Makes what the scripts or the JSON ask for, from the current values. `step` is the same on all ranks, and
-        `time` is finite."""
+        """Makes what the scripts or the JSON ask for, from the current values. `step` is the same on all ranks and at least 0,
+        with scripts below 2**31, and `time` is finite."""
         self._check(self._library.vdi_catalyst_execute(self._handle, step, time))
 
     def parameter(self, name, value, low, high):
