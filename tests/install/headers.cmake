@@ -1,5 +1,5 @@
-# The installed headers of the library without VTK are the public ones and those that they include, and no others. Run
-# with -DHEADER_DIR=...
+# The installed headers of the library without VTK are the public ones and those that they include, and no others. No
+# comment of theirs names another file of the library's source. Run with -DHEADER_DIR=...
 cmake_minimum_required(VERSION 3.25)
 set(reached vdi/core/Error.h vdi/io/VdiFile.h vdi/pipeline/VdiGenerator.h vdi/pipeline/VdiRenderer.h)
 set(errors "")
@@ -25,6 +25,20 @@ file(GLOB_RECURSE installed RELATIVE "${HEADER_DIR}" "${HEADER_DIR}/vdi/*")
 list(REMOVE_ITEM installed ${reached})
 foreach(header IN LISTS installed)
   set(errors "${errors}${header} is installed, but no public header includes it\n")
+endforeach()
+
+file(GLOB_RECURSE headers RELATIVE "${HEADER_DIR}" "${HEADER_DIR}/*.h")
+foreach(header IN LISTS headers)
+  file(READ "${HEADER_DIR}/${header}" text)
+  string(REGEX MATCHALL "[A-Za-z0-9_/]+\\.(h|c|cpp|cxx|glsl|comp)[^A-Za-z]" names "${text}")
+  list(TRANSFORM names REPLACE "[^A-Za-z]$" "")
+  list(REMOVE_DUPLICATES names)
+  list(FILTER names EXCLUDE REGEX "^(vtk[A-Za-z]+|mpi|stdint)\\.h$")
+  foreach(name IN LISTS names)
+    if(NOT "/${headers}" MATCHES "[/;]${name}(;|$)")
+      set(errors "${errors}${header} names ${name}, which isn't installed\n")
+    endif()
+  endforeach()
 endforeach()
 if(errors)
   message(FATAL_ERROR "${errors}")
