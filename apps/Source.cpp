@@ -322,10 +322,10 @@ void addRegionOptions(CLI::App& command, QualityOptions& options) {
 
 void addBlendingOptions(CLI::App& command, QualityOptions& options) {
   command
-      .add_option(
-          "--blend", options.blend,
-          "how a ray's scalars become a pixel: composite; maximum or minimum, with that scalar's colour and "
-          "opacity; isosurface, with those of each isovalue on the ray. A VDI holds only composite")
+      .add_option("--blend", options.blend,
+                  "rule that turns a ray's scalars into a pixel: composite; maximum or minimum, with that "
+                  "scalar's colour and opacity; isosurface, with those of each isovalue on the ray. A VDI "
+                  "holds only composite")
       ->type_name("NAME")
       ->capture_default_str()
       ->group(qualityGroup);

@@ -40,7 +40,7 @@ void requireCountable(const vdi_catalyst_block& block) {
   for (const int32_t cells : block.cells) {
     const std::int64_t more = std::int64_t{cells} + 1;
     require(more <= std::numeric_limits<int>::max() && points <= maximum / more,
-            "a block of more cells than can be counted");
+            "a block has too many cells to count");
     points *= more;
   }
 }
@@ -51,7 +51,7 @@ void checkBlock(const vdi_catalyst_block& block) {
     require(block.cells[axis] >= 1, "a block needs at least one cell per axis");
     require(block.ghost_lo[axis] >= 0 && block.ghost_hi[axis] >= 0, "ghost layers can't be negative");
     require(std::int64_t{block.ghost_lo[axis]} + block.ghost_hi[axis] < block.cells[axis],
-            "a block of nothing but ghost cells");
+            "a block has only ghost cells");
     require(std::isfinite(block.spacing[axis]) && block.spacing[axis] > 0.0,
             "spacing must be finite and > 0");
     require(std::isfinite(block.origin[axis]), "the origin must be finite");
@@ -97,7 +97,7 @@ int conclude(Calls& self, int code, std::string_view text, std::optional<std::in
   const std::string message = shared(self.comm, text, speaker);
   try {
     self.error = "rank " + std::to_string(speaker) + ": " +
-                 (message.empty() ? "a script failed without saying why" : message);
+                 (message.empty() ? "a script failed without a message" : message);
     if (rank == 0) print(self, step);
   } catch (const std::bad_alloc&) {
     self.error = "out of memory";  // fits into a string without an allocation
@@ -152,10 +152,10 @@ bool isStep(std::int64_t step) {
 void requireStep(std::int64_t step) {
   if (isStep(step)) return;
   const std::int64_t maximum = std::numeric_limits<int>::max();
-  throw std::invalid_argument(
-      "step " + std::to_string(step) + " isn't handed over: ParaView counts steps from 0 to " +
-      std::to_string(maximum) +
-      "; hand over a smaller number that goes on after a restart, or files of before are replaced");
+  throw std::invalid_argument("step " + std::to_string(step) +
+                              " is refused: ParaView counts steps from 0 to " + std::to_string(maximum) +
+                              ". Use smaller numbers, and continue them after a restart, or the new files "
+                              "replace those of the earlier run");
 }
 
 }  // namespace vdi::catalyst

@@ -197,8 +197,9 @@ std::optional<bool> Fields::associationOf(const std::string& name) const {
   const bool ofCells = has(name, true);
   const bool ofPoints = has(name, false);
   if (ofCells && ofPoints)
-    throw std::runtime_error("there are arrays '" + name +
-                             "' of cells and of points: 'association' must name one");
+    throw std::runtime_error(
+        "the name '" + name +
+        "' belongs to an array of cells and to one of points: 'association' must choose one");
   return ofCells || ofPoints ? std::optional(ofCells) : std::nullopt;
 }
 
@@ -229,8 +230,8 @@ Fields::Values Fields::valuesOf(const std::string& name, bool cells, int compone
                              std::to_string(components));
   }
   if (components > 1 && component >= components) {
-    throw std::runtime_error("there is no component " + std::to_string(component) + ", '" + name + "' has " +
-                             std::to_string(components));
+    throw std::runtime_error("component " + std::to_string(component) + " doesn't exist: '" + name +
+                             "' has " + std::to_string(components));
   }
   return {array->type, array->values};
 }
@@ -273,7 +274,9 @@ bool agreeOnCells(const comm::Communicator& comm, const Fields& fields, const st
   comm.allReduceMax(kinds);
   if (kinds[0] > 0 && kinds[1] > 0) {
     throw Error(ErrorCode::InvalidArgument,
-                "ranks have '" + name + "' of cells and of points: 'association' must name one");
+                "the name '" + name +
+                    "' belongs to an array of cells on some ranks and to one of points on others: "
+                    "'association' must choose one");
   }
   const bool cells = kinds[1] > 0;
   std::array<std::uint64_t, 2> counts{fields.blocks().size(), 0};
@@ -281,9 +284,10 @@ bool agreeOnCells(const comm::Communicator& comm, const Fields& fields, const st
   comm.allReduceSum(counts);
   if (counts[0] == 0 || counts[1] > 0) return cells;
   comm.together([&] {
-    const std::string kind = kinds[0] + kinds[1] > 0 ? "' of " + kindOf(cells) : "'";
+    const std::string kind = kinds[0] + kinds[1] > 0 ? " of " + kindOf(cells) : "";
     if (!fields.blocks().empty() && !fields.has(name, cells))
-      throw std::runtime_error("there is no array '" + name + kind + "; the arrays are: " + fields.names());
+      throw std::runtime_error("no array" + kind + " is named '" + name +
+                               "'; the arrays are: " + fields.names());
   });
   throw Error(ErrorCode::InvalidArgument, "all blocks lack the array '" + name + "' of " + kindOf(cells));
 }

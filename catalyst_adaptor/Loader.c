@@ -147,7 +147,7 @@ static int initialize_some(int32_t communicator, const vdi_given* given, vdi_eng
                            vdi_catalyst** catalyst) {
   const MPI_Comm comm = communicator_of(communicator);
   if (comm == MPI_COMM_NULL) {
-    fprintf(stderr, "vdi_catalyst: there is no MPI, or no communicator has this Fortran handle\n");
+    fprintf(stderr, "vdi_catalyst: MPI isn't initialised, or the handle isn't a communicator's\n");
     return VDI_CATALYST_BAD_ARGUMENT;
   }
   /* A JSON text may ask for isolation, too, and the isolated engine reads it. The engine of a JSON run under

@@ -77,7 +77,7 @@ void Parameters::prepare(const Parameter& parameter) {
   constexpr double largestWhole = 9007199254740992.0;  // doubles represent all whole numbers up to it
   if (parameter.isWhole && std::max(std::abs(parameter.low), std::abs(parameter.high)) > largestWhole)
     failFor(parameter, "has bounds beyond 2^53");
-  if (all_.size() >= mostParameters) throw std::invalid_argument("there are 64 parameters at most");
+  if (all_.size() >= mostParameters) throw std::invalid_argument("a run can have at most 64 parameters");
   all_.reserve(mostParameters);
 }
 

@@ -260,16 +260,17 @@ function chunksOf(bytes, header) {
     const listCount = Math.min(header.listsPerChunk, lists - firstList);
     const plainBytes = header.compact ? 8 + 4 * listCount + 9 * count : 4 * listCount + 24 * count;
     const packed = bytes.subarray(at, at + packedBytes);
-    if (packed.length !== packedBytes) fail("the chunks don't add up to the data");
+    if (packed.length !== packedBytes) fail("its chunks' sizes don't add up to the header's size of the data");
     if (count > listCount * header.budget || plainBytes > 0x7e000000 || lz4AnnouncedBytes(packed) !== plainBytes)
       fail(`the chunk from list ${firstList} on doesn't hold ${count} supersegments`);
     chunks.push({packed, firstList, listCount, first, count, plainBytes});
     at += packedBytes;
     first += count;
   }
-  if (at !== HEADER_BYTES + header.chunkCount * ENTRY_BYTES + header.dataBytes) fail("the chunks don't add up to the data");
+  if (at !== HEADER_BYTES + header.chunkCount * ENTRY_BYTES + header.dataBytes)
+    fail("its chunks' sizes don't add up to the header's size of the data");
   if (first !== header.supersegmentCount || first >= 0x100000000)
-    fail("the chunks don't add up to the supersegments");
+    fail("its chunks' supersegments don't add up to the header's number");
   return chunks;
 }
 
@@ -417,7 +418,7 @@ export async function decodeVdi(bytes, pause = () => undefined) {
     if (!checksumHolds(chunk.packed, table, c * ENTRY_BYTES + 8))
       fail(`the checksum of the chunk from list ${chunk.firstList} on is wrong`);
     const plain = room.subarray(0, chunk.plainBytes);
-    if (!lz4Expand(chunk.packed, plain)) fail(`the chunk from list ${chunk.firstList} on doesn't decompress to its size`);
+    if (!lz4Expand(chunk.packed, plain)) fail(`the chunk from list ${chunk.firstList} on doesn't decompress to the size that it should have`);
     if (header.compact) {
       takeCode(plain, chunk, vdi);
       decodeCompact(chunk, plain, vdi);

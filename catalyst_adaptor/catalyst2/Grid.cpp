@@ -95,20 +95,20 @@ Elements elementsOf(const Node& field, const Counts& counts, std::int64_t count)
       const Leaf leaf = node.leaf();
       if (!node.isWhole() || leaf.count != 3) node.refuse("isn't made of 3 whole numbers");
       const std::int64_t value = leaf.wholeAt(static_cast<std::int64_t>(axis));
-      if (value < 0 || value > count) node.refuse("leads beyond the values");
+      if (value < 0 || value > count) node.refuse("points outside the values");
       return value;
     };
     if (strides) elements.strides[axis] = numberOf(*strides);
     std::int64_t start = 0;
     std::int64_t length = 0;
     if (offsets && __builtin_mul_overflow(numberOf(*offsets), elements.strides[axis], &start))
-      offsets->refuse("leads beyond the values");
+      offsets->refuse("points outside the values");
     if (__builtin_mul_overflow(counts[axis] - 1, elements.strides[axis], &length) ||
         __builtin_add_overflow(start, length, &length) || __builtin_add_overflow(last, length, &last))
-      field.refuse("leads beyond the values");
+      field.refuse("points outside the values");
     elements.first += start;
   }
-  if (last >= count) field.refuse("leads beyond its " + std::to_string(count) + " values");
+  if (last >= count) field.refuse("points outside its " + std::to_string(count) + " values");
   return elements;
 }
 

@@ -50,14 +50,14 @@ Settings settingsOf(const Node& params) {
       if (!script.file.ends_with(".json")) {
         settings.scripts.push_back(std::move(script));
       } else if (settings.json) {
-        node.refuse("is a second run without a script; one can be made");
+        node.refuse("is a second run without a script; only one is possible");
       } else {
         settings.json = script.file;
       }
     }
   }
   if (settings.json && !settings.scripts.empty())
-    catalyst.refuse("has scripts and a run without a script; either can be made");
+    catalyst.refuse("has scripts and a run without a script; choose one of them");
   if (!settings.json && settings.scripts.empty())
     catalyst.refuse("has neither scripts nor vdi/json, so nothing would be made");
   if (const auto channel = catalyst.find("vdi/channel")) settings.channel = channel->text();

@@ -140,9 +140,9 @@ int initializeAny(int32_t fortran_communicator, const char* json, bool isJson, v
   if (code == VDI_CATALYST_OK) code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] { read(options); });
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_ENGINE, [&] {
-      require(alive(isJson) == nullptr, isJson
-                                            ? "a run by JSON goes on in this process; finalize it first"
-                                            : "a run of scripts goes on in this process; finalize it first");
+      require(alive(isJson) == nullptr,
+              isJson ? "a run without a script is still active in this process; finalize it first"
+                     : "a run of scripts is still active in this process; finalize it first");
     });
   }
   if (code == VDI_CATALYST_OK) {

@@ -43,7 +43,9 @@ std::string programFile() {
     throw std::runtime_error("the path of vdi_catalyst_process is unknown");
   const auto file = std::filesystem::absolute(self.dli_fname).parent_path() / "vdi_catalyst_process";
   if (access(file.c_str(), X_OK) != 0)
-    throw std::runtime_error(file.string() + " isn't there; it belongs to the adaptor");
+    throw std::runtime_error(
+        file.string() +
+        " is missing or can't be executed; it is part of pv-vdi's adaptor, so reinstall pv-vdi");
   return file.string();
 }
 

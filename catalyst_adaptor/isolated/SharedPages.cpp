@@ -19,9 +19,8 @@ namespace {
 constexpr std::uint64_t page = 65536;  // a whole number of pages on every host, and of what devices import
 
 [[noreturn]] void throwNoRoom(std::uint64_t bytes, int error) {
-  throw std::runtime_error(
-      "no room for " + std::to_string((bytes >> 20) + 1) +
-      " MiB of memory shared with the process that makes frames: " + std::strerror(error));
+  throw std::runtime_error("not enough memory for " + std::to_string((bytes >> 20) + 1) +
+                           " MiB to share with the process that makes frames: " + std::strerror(error));
 }
 
 /// Throws if the size is beyond this process's limit, where the kernel would send a signal that ends the

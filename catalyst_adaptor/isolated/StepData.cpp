@@ -133,7 +133,7 @@ class StepReader {
     for (double& offset : particles.offset) offset = take<double>();
     given.kind = take<DepositKind>() == DepositKind::Density ? VDI_CATALYST_DENSITY : VDI_CATALYST_SUM;
     given.count = static_cast<std::int64_t>(take<std::uint64_t>());
-    if (given.count < 0) throw std::runtime_error("a step's particles are more than can be counted");
+    if (given.count < 0) throw std::runtime_error("a step has too many particles to count");
     const auto column = [&](const void*& first, std::int32_t& type, std::int64_t& stride) {
       const auto isDouble = take<bool>();
       const auto isOne = take<bool>();

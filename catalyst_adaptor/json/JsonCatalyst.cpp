@@ -93,7 +93,7 @@ enum class FrameMaker { Simulation, Process, NextProcess };
 
 int start(vdi_catalyst& self, const char* json, FrameMaker maker) {
   int code = guarded(self, VDI_CATALYST_ENGINE, [&] {
-    require(alive() == nullptr, "a run by JSON goes on in this process; finalize it first");
+    require(alive() == nullptr, "a run without a script is still active in this process; finalize it first");
   });
   if (code != VDI_CATALYST_OK) return code;
   std::optional<vdi::comm::Communicator> comm;

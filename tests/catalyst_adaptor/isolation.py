@@ -217,7 +217,7 @@ def no_room():
     """If a rank finds no memory to share, the step fails on all ranks, and the next one is tried."""
     run = Run({"every": 2}, 6, VDI_TEST_SIZE="64", VDI_TEST_FILE_LIMIT="100000")
     assert run.codes == [SCRIPT, 0, SCRIPT, 0, 0, 0] and run.end == 0 and made() == ["vdi_000004.vdi"], run.codes
-    assert "no room for 3 MiB of memory shared with the process" in run.lines[0] and "again" in run.lines[1], run.lines
+    assert "not enough memory for 3 MiB to share with the process" in run.lines[0] and "again" in run.lines[1], run.lines
 
 
 def unreadable():
@@ -226,7 +226,7 @@ def unreadable():
         open("once", "w").close()
         run = Run({"output": "r%d_{timestep}.vdi" % rank}, 6, VDI_TEST_SIZE="32", VDI_TEST_PAUSE="300",
                   **dying("mapping", "fail", rank, VDI_TEST_DIE_ONCE=os.path.abspath("once")))
-        one_line(run, "step 0: rank %d: no room for 1 MiB of memory shared with the process.*annot allocate memory" % rank)
+        one_line(run, "step 0: rank %d: not enough memory for 1 MiB to share with the process.*annot allocate memory" % rank)
         assert sorted([*run.codes, run.end]) == 6 * [0] + [SCRIPT], run.codes
         assert made() == ["r%d_%d.vdi" % (rank, step) for step in range(1, 6)], made()
         for name in made():
@@ -251,7 +251,7 @@ def unequal():
     # A message about an array that all lack lists the others.
     for how in ("process", "none"):
         run = Run({"field": "X"}, 1, VDI_TEST_UNEQUAL="1", VDI_ISOLATION=how)
-        assert "no array 'X'; the arrays are: cells 'T', cells 'W'" in run.lines[0], run.lines
+        assert "no array is named 'X'; the arrays are: cells 'T', cells 'W'" in run.lines[0], run.lines
 
 
 def launcher():

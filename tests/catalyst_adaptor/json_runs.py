@@ -119,7 +119,7 @@ def conditions():
         return True
 
     check(has_moved, {"change": "V", "above": enough}, "c")
-    run({"when": {"max": "none", "above": 0}, "existing": "continue"}, 3, said="there is no array 'none'")
+    run({"when": {"max": "none", "above": 0}, "existing": "continue"}, 3, said="no array is named 'none'")
 
 
 def cameras():
@@ -182,7 +182,7 @@ def budget():
     less = events("less.jsonl")[1]["device_bytes"]
     assert less <= most << 20 < free, (less, most, free)
     assert open("less_0.vdi", "rb").read() == open("free_0.vdi", "rb").read()
-    run({"output": "none_{timestep}.vdi", "max_device_mib": 1}, 3, said="MiB of the allowed 1 MiB are held here")
+    run({"output": "none_{timestep}.vdi", "max_device_mib": 1}, 3, said="MiB of the allowed 1 MiB, and")
     # Steps without memory are left out. The existing memory suffices for all.
     text = run({"output": "h_{timestep}.vdi", "max_host_mib": 1, "log": "host.jsonl"}, 0, 0, said="would need")
     assert text.count("left out: a process") == 1 and made(".vdi", "h_") == [], text

@@ -297,7 +297,7 @@ TEST_CASE("more elements than MPI counts: every rank throws, nothing is sent") {
   counts.front() = sender ? tooMany : 1;
   const auto check = [&](const Thrown& thrown, bool concerned) {
     CHECK(thrown.code == (concerned ? ErrorCode::Communication : ErrorCode::RemoteRank));
-    CHECK(thrown.text.find("elements for one rank") != std::string::npos);
+    CHECK(thrown.text.find("elements in one exchange") != std::string::npos);
   };
   // Sender and receiver both notice; ranks that neither send nor receive that much are told.
   check(thrownBy([&] { world.allToAll(bytes, counts, 1); }), sender || world.rank() == 0);

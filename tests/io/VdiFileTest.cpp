@@ -315,7 +315,7 @@ TEST_CASE(
   CHECK_THAT(refusal(sound, place, 'j'), ContainsSubstring("aren't JSON"));
   CHECK_THAT(refusal(sound, place + 4, 1U), ContainsSubstring("the metadata have"));
   CHECK_THAT(refusal(sound, place + 8, std::uint64_t{1}), ContainsSubstring("metadata's checksum"));
-  CHECK_THAT(refusal(sound, 8, 1U), ContainsSubstring("header says"));
+  CHECK_THAT(refusal(sound, 8, 1U), ContainsSubstring("header gives"));
   // encode refuses the VDIs that decode would refuse.
   Vdi vdi = test::colored(test::noisyVdi(4, 4, 3));
   vdi.coloring->function.unitDistance = 0.0;

@@ -92,9 +92,9 @@ check(not texts, "a viewpoint near the VDI's own gets none")
 # Arrays that don't exist, or exist only with the other association.
 for association, name, words in (
         ("CELLS", "ball",
-         ["no array 'ball' of cells", "['POINTS', 'ball']", "'velocity' (3 components)", "of cells: 'layers'"]),
-        ("POINTS", "layers", ["no array 'layers' of points", "['CELLS', 'layers']", "'ball'"]),
-        ("POINTS", "bell", ["no array 'bell' of points", "'ball'", "of cells: 'layers'"])):
+         ["no array of cells is named 'ball'", "['POINTS', 'ball']", "'velocity' (3 components)", "of cells: 'layers'"]),
+        ("POINTS", "layers", ["no array of points is named 'layers'", "['CELLS', 'layers']", "'ball'"]),
+        ("POINTS", "bell", ["no array of points is named 'bell'", "'ball'", "of cells: 'layers'"])):
     wrong = filter_of(source, association, name)
     for attempt in ("first", "second"):
         with Messages("ErrorEvent") as texts:

@@ -90,7 +90,7 @@ picture = simple.VolumetricDepthImage(Input=wavelet, Resolution=[64, 48], Pictur
 simple.Show(picture, view)
 simple.Render(view)
 said = pvtest.message_in(view)
-check("no VDI in this data set" in said and "shows nothing" in said,
+check("This data set has no VDI" in said and "shows nothing" in said,
       "a picture without a VDI gets a message in addition to the empty VDI's")
 boxes = pvtest.text_boxes(view)
 check(len(boxes) == 2 and (boxes[0][0] > boxes[1][1] or boxes[1][0] > boxes[0][1]), "the two messages don't overlap")

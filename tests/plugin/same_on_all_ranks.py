@@ -52,7 +52,7 @@ check(errors_of(nothing), "rank %d: an input without data is an error" % rank)
 for attempt in ("second", "third"):
     check(not errors_of(nothing), "rank %d: an input without data isn't reported a %s time" % (rank, attempt))
 image = filter_of(wavelet, "RTDate")
-check("no array 'RTDate'" in errors_of(image), "rank %d: a missing array is an error" % rank)
+check("no array of points is named 'RTDate'" in errors_of(image), "rank %d: a missing array is an error" % rank)
 check(not errors_of(image), "rank %d: a missing array isn't reported twice" % rank)
 image.SelectInputScalars = ["POINTS", "RTData"]
 check(not errors_of(image), "rank %d: with an array that exists, the filter works" % rank)

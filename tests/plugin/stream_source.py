@@ -179,7 +179,7 @@ def nothing_yet():
     source = simple.VDIStream(URL=empty.link, Patience=0.5)
     text = standard_error(lambda: screenshot(source))
     check(text == "", "a source that waits is no error: " + text)
-    check("There is no VDI to show yet" in message_in(view), "the view says that there is no VDI yet: " + message_in(view))
+    check("No VDI has arrived yet" in message_in(view), "the view says that there is no VDI yet: " + message_in(view))
     empty.appear(1)
     take_next(source, 0)
     check(step_of(source) == 1, "a source that has waited has the first VDI")
@@ -238,7 +238,7 @@ def loaded_without_token(live, state):
     simple.LoadState(state)
     loaded, = simple.GetSources().values()
     text = standard_error(loaded.UpdatePipeline)
-    check("there is no token" in information(loaded, "Connection") and text.count("there is no token") == 1,
+    check("the token is missing" in information(loaded, "Connection") and text.count("the token is missing") == 1,
           "a loaded state says once that it needs a token: " + text)
     loaded.URL = live.link
     check(step_of(loaded) == 4, "a loaded state gets its token by the link")

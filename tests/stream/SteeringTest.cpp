@@ -155,7 +155,7 @@ TEST_CASE("wishes are held against what there is") {
           wish.range = {1.0, 2.0};
           wish.parameters = {{"feed", 0.1}, {"seeds", 9.0}};
         }) == "");
-  CHECK(objection([](Wish& wish) { wish.preset = "Plaid"; }) == "there is no colour map of that name");
+  CHECK(objection([](Wish& wish) { wish.preset = "Plaid"; }) == "no colour map has that name");
   CHECK(objection([](Wish& wish) { wish.parameters["kill"] = 0.0; }) ==
         "the simulation has no parameter \"kill\"");
   CHECK(objection([](Wish& wish) { wish.parameters["feed"] = 0.11; }) == "\"feed\" must be from 0 to 0.1");

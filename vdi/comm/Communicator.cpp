@@ -66,7 +66,7 @@ struct Layout {
     if (total <= maxElements) return;
     throw Error(
         ErrorCode::Communication,
-        fmt::format("{} elements for one rank in one exchange; MPI's counts end at {}", total, maxElements));
+        fmt::format("one rank would get {} elements in one exchange; MPI allows {}", total, maxElements));
   }
 };
 

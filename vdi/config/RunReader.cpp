@@ -180,7 +180,7 @@ std::vector<RunCamera> camerasOf(const JsonValue& value) {
   std::set<std::string> names;
   for (const JsonValue& item : value.items()) {
     if (cameras.size() >= static_cast<std::size_t>(mostCameras))
-      value.fail(fmt::format("there are {} cameras at most", mostCameras));
+      value.fail(fmt::format("a run can have at most {} cameras", mostCameras));
     cameras.push_back(namedCameraOf(item));
     if (!names.insert(cameras.back().name).second) item.at("name").fail("another camera has this name");
   }

@@ -51,7 +51,7 @@ void validate(const Blending& blending) {
   }
   if (count == 0) refuse("blend mode isosurface needs at least one isovalue");
   if (count > maxIsovalues)
-    refuse(fmt::format("a picture shows at most {} isovalues, there are {}", maxIsovalues, count));
+    refuse(fmt::format("a picture shows at most {} isovalues, but {} were given", maxIsovalues, count));
   for (const double value : blending.isovalues) {
     if (!std::isfinite(value)) refuse(fmt::format("an isovalue must be finite, but is {}", value));
   }

@@ -31,7 +31,7 @@ std::uint64_t wholePages(std::uint64_t bytes) {
 
 [[noreturn]] void throwNoRoom(std::uint64_t bytes, const char* kind, int error) {
   throw Error(ErrorCode::OutOfMemory,
-              fmt::format("no room for {} MiB of {} memory: {}", bytes >> 20, kind, std::strerror(error)));
+              fmt::format("not enough {} memory for {} MiB: {}", kind, bytes >> 20, std::strerror(error)));
 }
 
 std::span<std::byte> map(std::uint64_t size, int flags, int descriptor, const char* kind) {

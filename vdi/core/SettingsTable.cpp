@@ -95,13 +95,14 @@ constexpr std::array tableRows{
         {.name = "algorithm",
          .property = "Algorithm",
          .key = "algorithm",
-         .help = "how samples become supersegments: merge, or bisection, which is the paper's search"}),
+         .help = "algorithm that turns samples into supersegments: merge, or bisection, which is the paper's "
+                 "search"}),
     namedRow<&GenerateSettings::budget, nameOfBudget, budgetFromString>(
         {.name = "budget",
          .property = "Budget",
          .key = "budget",
-         .help = "how lists share supersegments: list, up to N_S each; total, as many in all, but up to "
-                 "twice N_S for a list that needs them and fewer for the others"}),
+         .help = "rule by which lists share supersegments: list, up to N_S each; total, as many in all, but "
+                 "up to twice N_S for a list that needs them and fewer for the others"}),
     row<&GenerateSettings::fill>(
         {.name = "fill",
          .property = "Fill",

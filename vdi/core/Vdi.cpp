@@ -59,12 +59,13 @@ SupersegmentLists Vdi::expandedLists() const {
 }
 
 void validateShape(const Vdi& vdi) {
-  if (vdi.width < 1 || vdi.height < 1) fail(fmt::format("{} x {} lists", vdi.width, vdi.height));
+  if (vdi.width < 1 || vdi.height < 1)
+    fail(fmt::format("a VDI can't have {} x {} lists", vdi.width, vdi.height));
   // Does not double the margin, since large values would overflow.
   const auto leavesSome = [](int size, int margin) { return margin >= 0 && margin <= (size - 1) / 2; };
   if (!leavesSome(vdi.width, vdi.margin.x) || !leavesSome(vdi.height, vdi.margin.y)) {
-    fail(fmt::format("a margin of {} and {} of {} x {} lists", vdi.margin.x, vdi.margin.y, vdi.width,
-                     vdi.height));
+    fail(fmt::format("a margin of {} x {} lists leaves no picture of {} x {}", vdi.margin.x, vdi.margin.y,
+                     vdi.width, vdi.height));
   }
   const DepthCode& code = vdi.depthCode;
   const bool usable = code.exists() && code.first >= 0.0F &&
@@ -101,7 +102,7 @@ void validateEnds(const Vdi& vdi) {
   const auto& offsets = vdi.offsets();
   if (offsets.size() != lists + 1) fail(fmt::format("{} offsets for {} lists", offsets.size(), lists));
   if (offsets.front() != 0 || offsets.back() != vdi.supersegmentCount()) {
-    fail(fmt::format("the offsets end at {}, there are {} supersegments", offsets.back(),
+    fail(fmt::format("the offsets end at {}, but the VDI has {} supersegments", offsets.back(),
                      vdi.supersegmentCount()));
   }
 }

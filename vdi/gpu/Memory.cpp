@@ -27,11 +27,12 @@ double mebibytes(std::uint64_t bytes) {
   const DeviceLimits& limits = device.limits();
   throw Error(
       ErrorCode::OutOfMemory,
-      fmt::format("no room for a {} of {:.1f} MiB: {:.1f} MiB of the {} {:.0f} MiB are held here, and one "
-                  "allocation may have up to {:.0f} MiB",
-                  what, mebibytes(bytes), mebibytes(device.allocatedBytes()),
-                  limits.mostBytes > 0 ? "allowed" : "device's", mebibytes(limits.memoryBytes),
-                  mebibytes(limits.maxAllocationBytes)),
+      fmt::format(
+          "not enough memory for a {} of {:.1f} MiB: this process holds {:.1f} MiB of the {} {:.0f} MiB, and "
+          "one allocation can have at most {:.0f} MiB",
+          what, mebibytes(bytes), mebibytes(device.allocatedBytes()),
+          limits.mostBytes > 0 ? "allowed" : "device's", mebibytes(limits.memoryBytes),
+          mebibytes(limits.maxAllocationBytes)),
       device.name());
 }
 

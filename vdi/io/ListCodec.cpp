@@ -315,7 +315,8 @@ DepthCode unpackLists(std::span<const std::byte> packed, std::uint32_t before, s
   const int got =
       LZ4_decompress_safe(reinterpret_cast<const char*>(packed.data()), reinterpret_cast<char*>(plain.data()),
                           static_cast<int>(packed.size()), static_cast<int>(size));
-  if (got < 0 || static_cast<std::uint64_t>(got) != size) fail("it doesn't decompress to its size");
+  if (got < 0 || static_cast<std::uint64_t>(got) != size)
+    fail("a chunk doesn't decompress to the size that it should have");
 
   const std::byte* const lengths = plain.data() + codeBytes<Segment>;
   const std::byte* const columnData = lengths + ends.size() * sizeof(std::uint32_t);

@@ -115,13 +115,13 @@ Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes) {
   std::memcpy(&header, start.data(), sizeof(Header));
   if (header.magic != magicText) fail("it doesn't start with VDI-FILE");
   if (header.version < plainVersion || header.version > metadataVersion) {
-    fail(fmt::format("it has version {}, this program reads versions {} to {}", header.version, plainVersion,
-                     metadataVersion));
+    fail(fmt::format("it has version {}, but this program reads versions {} to {}", header.version,
+                     plainVersion, metadataVersion));
   }
   if (header.headerBytes != sizeof(Header)) fail(fmt::format("its header has {} bytes", header.headerBytes));
   if (header.headerChecksum != checksumOf(header)) fail("the header's checksum is wrong");
   if (!isEncoding(header.encoding)) {
-    fail(fmt::format("its supersegments have encoding {}, this program reads encodings 0 to {}",
+    fail(fmt::format("its supersegments have encoding {}, but this program reads encodings 0 to {}",
                      header.encoding, std::variant_size_v<AnyLists> - 1));
   }
   const bool hasMargin = header.marginX != 0 || header.marginY != 0;
@@ -129,21 +129,23 @@ Header parseHeader(std::span<const std::byte> start, std::uint64_t fileBytes) {
     fail("it uses flags that this program doesn't know");
   const auto goodSide = [](std::uint32_t side) { return side >= 1 && side <= View::maxSide; };
   if (!goodSide(header.width) || !goodSide(header.height) || header.listsPerChunk == 0) {
-    fail(fmt::format("{} x {} lists in chunks of {}", header.width, header.height, header.listsPerChunk));
+    fail(fmt::format("it can't have {} x {} lists in chunks of {}", header.width, header.height,
+                     header.listsPerChunk));
   }
   if (2U * header.marginX >= header.width || 2U * header.marginY >= header.height) {
-    fail(fmt::format("a margin of {} and {} of {} x {} lists", header.marginX, header.marginY, header.width,
-                     header.height));
+    fail(fmt::format("a margin of {} x {} lists leaves no picture of {} x {}", header.marginX, header.marginY,
+                     header.width, header.height));
   }
   const std::uint64_t chunks = chunksOf(std::uint64_t{header.width} * header.height, header.listsPerChunk);
   if (chunks != header.chunkCount) {
-    fail(fmt::format("{} chunks, there should be {}", header.chunkCount, chunks));
+    fail(fmt::format("it has {} chunks instead of {}", header.chunkCount, chunks));
   }
   const std::uint64_t frontBytes = sizeof(Header) + chunks * sizeof(ChunkEntry);
   const bool hasMetadata = header.version == metadataVersion;
   const std::uint64_t rest = frontBytes > fileBytes ? 0 : fileBytes - frontBytes;
   if (frontBytes > fileBytes || header.dataBytes > rest || (!hasMetadata && header.dataBytes != rest)) {
-    fail(fmt::format("it has {} bytes, its header says {} + {}", fileBytes, frontBytes, header.dataBytes));
+    fail(fmt::format("it has {} bytes, but its header gives {} + {}", fileBytes, frontBytes,
+                     header.dataBytes));
   }
   if (hasMetadata && (rest - header.dataBytes < sizeof(MetadataHeader) ||
                       rest - header.dataBytes > sizeof(MetadataHeader) + maxMetadataBytes)) {
@@ -159,7 +161,7 @@ std::optional<Coloring> parseMetadata(const Header& header, std::span<const std:
   const std::span<const std::byte> text = bytes.subspan(sizeof(MetadataHeader));
   if (head.kind != kindJson) fail("its metadata aren't JSON");
   if (head.bytes != text.size()) {
-    fail(fmt::format("the metadata have {} bytes; their header says {}", text.size(), head.bytes));
+    fail(fmt::format("the metadata have {} bytes, but their header gives {}", text.size(), head.bytes));
   }
   if (head.checksum != checksumOf(text)) fail("the metadata's checksum is wrong");
   try {
@@ -193,9 +195,10 @@ std::vector<Chunk> parseTable(const Header& header, std::span<const std::byte> b
     next.firstList += next.listCount;
     next.firstSupersegment += next.supersegmentCount;
   }
-  if (next.dataOffset != header.dataBytes) fail("the chunks don't add up to the data");
+  if (next.dataOffset != header.dataBytes)
+    fail("its chunks' sizes don't add up to the header's size of the data");
   if (next.firstSupersegment != header.supersegmentCount || next.firstSupersegment > UINT32_MAX) {
-    fail("the chunks don't add up to the supersegments");
+    fail("its chunks' supersegments don't add up to the header's number");
   }
   return chunks;
 }

@@ -73,7 +73,7 @@ std::vector<std::byte> withPlainChunks(std::span<const std::byte> file) {
     if (LZ4_decompress_safe(reinterpret_cast<const char*>(file.data() + from),
                             reinterpret_cast<char*>(plain.data()), static_cast<int>(entry.packedBytes),
                             static_cast<int>(plain.size())) != static_cast<int>(plain.size())) {
-      throw Error(ErrorCode::Format, "a chunk doesn't decompress to its size");
+      throw Error(ErrorCode::Format, "a chunk doesn't decompress to the size that it should have");
     }
     from += entry.packedBytes;
     const std::size_t begin = result.size();

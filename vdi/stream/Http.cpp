@@ -95,11 +95,11 @@ HttpReply Site::reply(const HttpRequest& request) const {
     if (given.starts_with(scheme) && token_.accepts(given.substr(scheme.size())))
       return replyTo(request, http::status::ok, "application/json", status_());
     HttpReply reply = replyTo(request, http::status::unauthorized, "text/plain; charset=utf-8",
-                              "the status needs the token\n");
+                              "the status requires the token\n");
     reply.set(http::field::www_authenticate, "Bearer");
     return reply;
   }
-  return replyTo(request, http::status::not_found, "text/plain; charset=utf-8", "there is nothing here\n");
+  return replyTo(request, http::status::not_found, "text/plain; charset=utf-8", "not found\n");
 }
 
 bool Site::admits(const HttpRequest& request, std::string& cause) const {

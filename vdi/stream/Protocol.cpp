@@ -238,7 +238,7 @@ Level levelIn(const JsonValue& object) {
   const auto width = fields.count("width");
   const auto height = fields.count("height");
   if (level.level >= level.levels || level.bytes == 0 || width > mostLists || height > mostLists)
-    refuse("a level is out of its bounds");
+    refuse("a level's numbers are out of range");
   level.width = static_cast<int>(width);
   level.height = static_cast<int>(height);
   level.step = fields.countIfAny<std::uint64_t>("step").value_or(0);

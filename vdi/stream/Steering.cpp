@@ -47,8 +47,7 @@ std::string objectionTo(const Wish& wish, const Controls& controls) {
   if (wish.range && !controls.generator->range) return "the VDIs have no colour map";
   if (wish.preset) {
     const std::vector<std::string>& presets = controls.generator->presets;
-    if (std::ranges::find(presets, *wish.preset) == presets.end())
-      return "there is no colour map of that name";
+    if (std::ranges::find(presets, *wish.preset) == presets.end()) return "no colour map has that name";
   }
   for (const auto& [name, value] : wish.parameters) {
     std::string objection = objectionTo(name, value, controls.parameters);

@@ -193,7 +193,7 @@ void Viewer::enter(const Hello& hello, Clock::time_point now) {
     return;
   }
   if (hub_.viewers_.size() >= hub_.options_.mostViewers) {
-    refuse(Close::TooMany, fmt::format("there are {} viewers already", hub_.options_.mostViewers));
+    refuse(Close::TooMany, fmt::format("the server already has {} viewers", hub_.options_.mostViewers));
     return;
   }
   isWelcome_ = true;
@@ -212,7 +212,7 @@ void Viewer::enter(const Hello& hello, Clock::time_point now) {
 
 void Viewer::show(std::uint32_t index) {
   if (!hub_.series_ || index >= hub_.series_->size() || !hub_.options_.show) {
-    refuse(Close::BadMessage, fmt::format("there is no frame {} in a series", index));
+    refuse(Close::BadMessage, fmt::format("the series has no frame {}", index));
     return;
   }
   shown_ = index;

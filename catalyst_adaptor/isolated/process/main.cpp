@@ -206,7 +206,8 @@ int main(int argc, char** argv) {
     if (part == "work" && argc == 4)
       return vdi::catalyst::work(Socket(Descriptor(std::atoi(arguments[2]))),
                                  Descriptor(std::atoi(arguments[3])));
-    std::fprintf(stderr, "%s belongs to pv-vdi's Catalyst adaptor, which alone starts it\n", arguments[0]);
+    std::fprintf(stderr, "%s is part of pv-vdi's Catalyst adaptor; only the adaptor can start it\n",
+                 arguments[0]);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "vdi_catalyst: %s\n", error.what());
   }

@@ -64,16 +64,18 @@ void count(vtkDataObject* leaf, const ArrayChoice& choice, Holders& holders) {
     holders.missing = "the data have no arrays, neither of points nor of cells";
     return;
   }
-  const std::string wanted =
-      choice.name.empty() ? "are no active scalars" : fmt::format("is no array '{}'", choice.name);
+  const char* const kind = choice.cells ? "cells" : "points";
+  const std::string lack = choice.name.empty()
+                               ? fmt::format("the {} have no active scalars", kind)
+                               : fmt::format("no array of {} is named '{}'", kind, choice.name);
   const bool otherHas = !choice.name.empty() && has(attributesOf(image, !choice.cells), choice.name);
-  holders.missing = fmt::format(
-      "there {} of {}{}; of points there are: {}; of cells: {}", wanted, choice.cells ? "cells" : "points",
-      otherHas
-          ? fmt::format(" (SelectInputScalars = ['{}', '{}'] asks for the one of {})",
-                        choice.cells ? "POINTS" : "CELLS", choice.name, choice.cells ? "points" : "cells")
-          : "",
-      namesOf(image->GetPointData()), namesOf(image->GetCellData()));
+  holders.missing =
+      fmt::format("{}{}; arrays of points: {}; arrays of cells: {}", lack,
+                  otherHas ? fmt::format(" (SelectInputScalars = ['{}', '{}'] asks for the one of {})",
+                                         choice.cells ? "POINTS" : "CELLS", choice.name,
+                                         choice.cells ? "points" : "cells")
+                           : "",
+                  namesOf(image->GetPointData()), namesOf(image->GetCellData()));
 }
 
 }  // namespace

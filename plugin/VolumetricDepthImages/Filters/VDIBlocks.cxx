@@ -98,7 +98,7 @@ void requireComponent(vtkDataArray* array, int component) {
   const std::string why =
       component == vdi::phase
           ? fmt::format("a phase needs two components, real and imaginary; the array has {}", components)
-          : fmt::format("there is no component {}, the array has {}", component, components);
+          : fmt::format("component {} doesn't exist: the array has {}", component, components);
   throw Error(ErrorCode::InvalidArgument, why, array->GetName());
 }
 
@@ -107,7 +107,7 @@ void requireLength(vtkDataArray* array, const glm::ivec3& values, const std::str
   const vtkIdType needed = vtkIdType{values.x} * values.y * values.z;
   if (array->GetNumberOfTuples() >= needed) return;
   throw Error(ErrorCode::InvalidArgument,
-              fmt::format("the array '{}' has {} values, {} x {} x {} are needed",
+              fmt::format("the array '{}' has {} values instead of {} x {} x {}",
                           array->GetName() != nullptr ? array->GetName() : "", array->GetNumberOfTuples(),
                           values.x, values.y, values.z),
               block);

@@ -276,7 +276,7 @@ void vtkVDIStreamReader::Connect() {
     if (options.url.token.empty()) options.url.token = vdi::stream::givenToken(this->TokenFile);
     if (options.url.token.empty())
       throw vdi::Error(vdi::ErrorCode::InvalidArgument,
-                       "there is no token: paste the server's link as URL, or set Token File",
+                       "the token is missing: paste the server's link as URL, or set Token File",
                        options.url.authority());
     options.authority = this->Authority;
     options.decodes = true;

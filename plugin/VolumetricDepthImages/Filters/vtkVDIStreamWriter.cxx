@@ -55,7 +55,8 @@ int vtkVDIStreamWriter::FillInputPortInformation(int, vtkInformation* info) {
 void vtkVDIStreamWriter::Start() {
   constexpr int largestPort = 65535;
   if (this->Port < 0 || this->Port > largestPort)
-    throw vdi::Error(vdi::ErrorCode::InvalidArgument, fmt::format("there is no port {}", this->Port));
+    throw vdi::Error(vdi::ErrorCode::InvalidArgument,
+                     fmt::format("the port must be from 0 to 65535, but is {}", this->Port));
   this->Running = std::make_unique<vdi::stream::LiveStream>(
       vdi::stream::LiveOptions{.host = textOf(this->Host),
                                .port = static_cast<std::uint16_t>(this->Port),

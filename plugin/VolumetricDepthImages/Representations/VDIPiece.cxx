@@ -81,8 +81,7 @@ void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece) {
     return;
   }
   if (image == nullptr || image->GetFieldData()->GetAbstractArray("VDI.offsets") == nullptr) {
-    packProblem("There is no VDI in this data set. The filter Volumetric Depth Image makes one from it.",
-                piece);
+    packProblem("This data set has no VDI. The filter Volumetric Depth Image makes one from it.", piece);
     return;
   }
   try {

@@ -22,10 +22,10 @@ class vtkPolyData;
 namespace pv {
 
 /// The problem after the VDI's filter or reader has failed, which reports the reason as an error.
-constexpr const char* failedUpstream = "There is no VDI to show: its filter or reader has failed.";
+constexpr const char* failedUpstream = "No VDI can be shown: its filter or reader has failed.";
 
 /// Prefix of the problem's text while a source waits for a VDI (VDI.waiting).
-constexpr const char* noneYet = "There is no VDI to show yet: ";
+constexpr const char* noneYet = "No VDI has arrived yet: ";
 /// Whether `problem` is one of these two. A view shows them, but doesn't repeat them as errors.
 bool isSaidUpstream(const std::string& problem);
 
