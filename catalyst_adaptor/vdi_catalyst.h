@@ -15,7 +15,9 @@
  *     vdi_catalyst_finalize(catalyst);                              before MPI_Finalize
  *
  * All functions but vdi_catalyst_error are collective over the communicator: each rank makes all calls in the
- * same order, even a rank without blocks (count 0, null pointers). None ends the process. They return
+ * same order, even a rank without blocks (count 0, null pointers).
+ *
+ * No call ends the process on purpose; the exceptions are below. The functions return
  * VDI_CATALYST_OK or a code below, the same one on all ranks, and rank 0 prints a message to standard error.
  * Rank 0 prints a repeated message in full only once. A step that fails again gets one line, because its
  * files are missing. After an error, the next step works again, with the blocks and arrays from before.
@@ -274,13 +276,16 @@ VDI_CATALYST_API int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const ch
 
 /* Returns whether a script will do anything at this step: 1 if it will or if that is unknown, 0 if not; the
  * same on all ranks. After 0, the simulation need neither prepare its values nor call vdi_catalyst_execute.
- * The result is 1 in three cases: if a script isn't loaded yet, as before the first step; if a
- * script defines catalyst_execute, which runs at each step; or if the trigger of an extractor is
- * due. In a run without a script it is 1 if a frame is due by step, time or clock, whether or not
- * the data and the share of wall time will permit it. If viewers may steer, it is 1 at each step.
- * Where scripts run in a process of their own, it is 1, too, while that process is at work and
- * hasn't answered yet. It is 0 for a null or finalized handle and for a step that
- * vdi_catalyst_execute refuses. */
+ * With scripts the result is 1
+ *   - if a script isn't loaded yet, as before the first step;
+ *   - if a script defines catalyst_execute, which runs at each step;
+ *   - if the trigger of an extractor is due;
+ *   - where scripts run in a process of their own, also while that process is at work and hasn't answered.
+ * In a run without a script it is 1
+ *   - if a frame is due by step, time or clock, whether or not "when", "max_share" and "max_host_mib" will
+ *     permit it;
+ *   - at each step if viewers may steer.
+ * It is 0 for a null or finalized handle and for a step that vdi_catalyst_execute refuses. */
 VDI_CATALYST_API int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time);
 
 /* Makes what the scripts or the JSON text ask for at this step, of the blocks, arrays and particles as they

@@ -1,5 +1,5 @@
 // The one exception type that the library throws for bad input and a failing environment.
-// A caller's mistake (a broken precondition) is an assert, not an Error.
+// A mistake of the library's own code (a broken precondition) is an assert, not an Error.
 #pragma once
 
 #include <stdexcept>

@@ -15,7 +15,7 @@ struct DepthLattice;
 /// The precision in which a VDI's supersegments are stored, sent between ranks and written to files.
 enum class Precision : std::uint32_t {
   Full = 0,     // Supersegment: 24 bytes of floats
-  Compact = 1,  // CompactSupersegment: 8 bytes; from V_O within 1/255 of the floats
+  Compact = 1,  // CompactSupersegment: 8 bytes; from V_O within 1/255 of the floats for colours up to 1
 };
 
 const char* toString(Precision precision);  // "full", "compact"
