@@ -114,32 +114,33 @@ static int names_isolation(MPI_Comm comm) {
   return names;
 }
 
-/* The arguments with which a simulation initialises: one of the three. */
+/* The ways to initialise. The last two are those of a process that makes an isolated run's frames. */
+typedef enum vdi_kind { SCRIPTS, PIPELINES, JSON_TEXT, FRAMES_OF_JSON, FRAMES_OF_PIPELINES } vdi_kind;
+
+/* The arguments with which a simulation or such a process initialises. */
 typedef struct vdi_given {
   const char* const* scripts;
   const vdi_catalyst_pipeline* pipelines;
-  int32_t count;
+  int32_t count; /* of scripts or pipelines; FRAMES_OF_JSON: whether the process succeeds another one */
   const char* json;
-  /* 0: scripts, 1: pipelines, 2: JSON; an isolated run's frames are made here, 3: of JSON, and `count` is
-   * goes_on, 4: of pipelines */
-  int kind;
+  vdi_kind kind;
 } vdi_given;
 
 static int initialize_with(const vdi_engine* engine, int32_t communicator, const vdi_given* given,
                            vdi_catalyst** catalyst) {
   switch (given->kind) {
-    case 0:
+    case SCRIPTS:
       return engine->functions->initialize(communicator, given->count, given->scripts, catalyst);
-    case 1:
+    case PIPELINES:
       return engine->functions->initialize_pipelines(communicator, given->count, given->pipelines, catalyst);
-    case 2:
+    case JSON_TEXT:
       return engine->functions->initialize_json(communicator, given->json, catalyst);
-    case 3:
+    case FRAMES_OF_JSON:
       return engine->functions->make_frames_of_json(communicator, given->json, given->count, catalyst);
-    default:
-      return engine->functions->make_frames_of_pipelines(communicator, given->count, given->pipelines,
-                                                         catalyst);
+    case FRAMES_OF_PIPELINES:
+      break;
   }
+  return engine->functions->make_frames_of_pipelines(communicator, given->count, given->pipelines, catalyst);
 }
 
 /* If the isolated engine may have to carry out the run, asks it first. */
@@ -155,7 +156,9 @@ static int initialize_some(int32_t communicator, const vdi_given* given, vdi_eng
   const int goes_on = run == &json_run && json_handle != NULL;
   vdi_engine* const own = run == &json_run ? &json_engine : &script_engine;
   const int isolated =
-      goes_on ? *run == &isolated_engine : given->kind == 2 || (given->kind < 2 && names_isolation(comm));
+      goes_on ? *run == &isolated_engine
+              : given->kind == JSON_TEXT ||
+                    ((given->kind == SCRIPTS || given->kind == PIPELINES) && names_isolation(comm));
   vdi_engine* tried = isolated ? &isolated_engine : own;
   int code = prepare(tried, comm);
   if (code == VDI_CATALYST_OK) code = initialize_with(tried, communicator, given, catalyst);
@@ -187,30 +190,30 @@ static int initialize(int32_t communicator, const vdi_given* given, vdi_engine**
 
 int vdi_catalyst_initialize(int32_t fortran_communicator, int32_t script_count, const char* const* scripts,
                             vdi_catalyst** catalyst) {
-  const vdi_given given = {scripts, NULL, script_count, NULL, 0};
+  const vdi_given given = {scripts, NULL, script_count, NULL, SCRIPTS};
   return initialize(fortran_communicator, &given, &script_run, catalyst);
 }
 
 int vdi_catalyst_initialize_pipelines(int32_t fortran_communicator, int32_t script_count,
                                       const vdi_catalyst_pipeline* scripts, vdi_catalyst** catalyst) {
-  const vdi_given given = {NULL, scripts, script_count, NULL, 1};
+  const vdi_given given = {NULL, scripts, script_count, NULL, PIPELINES};
   return initialize(fortran_communicator, &given, &script_run, catalyst);
 }
 
 int vdi_catalyst_initialize_json(int32_t fortran_communicator, const char* json, vdi_catalyst** catalyst) {
-  const vdi_given given = {NULL, NULL, 0, json, 2};
+  const vdi_given given = {NULL, NULL, 0, json, JSON_TEXT};
   return initialize(fortran_communicator, &given, &json_run, catalyst);
 }
 
 int vdi_catalyst_make_frames_of_json(int32_t fortran_communicator, const char* json, int goes_on,
                                      vdi_catalyst** catalyst) {
-  const vdi_given given = {NULL, NULL, goes_on, json, 3};
+  const vdi_given given = {NULL, NULL, goes_on, json, FRAMES_OF_JSON};
   return initialize(fortran_communicator, &given, &json_run, catalyst);
 }
 
 int vdi_catalyst_make_frames_of_pipelines(int32_t fortran_communicator, int32_t script_count,
                                           const vdi_catalyst_pipeline* scripts, vdi_catalyst** catalyst) {
-  const vdi_given given = {NULL, scripts, script_count, NULL, 4};
+  const vdi_given given = {NULL, scripts, script_count, NULL, FRAMES_OF_PIPELINES};
   return initialize(fortran_communicator, &given, &script_run, catalyst);
 }
 
