@@ -7,9 +7,10 @@
 #   VDI_NEEDS_DISPLAY  whether its views need an X server; ParaView 6 draws them without one, too
 #   VDI_CONVERTS_ARRAYS  whether a filter that asks for cell data gets them from the points of a simulation's blocks, as
 #                      from ParaView 6 on
-#   VDI_COLORS_BY_PARTS  whether views of pvbatch --symmetric can colour by an array that only some
-#                        ranks have; with ParaView 6.1, such a run aborts
-#   VDI_LOADS_STATES_ON_RANKS  whether pvbatch on several ranks can load a state; with ParaView 6.1, it hangs
+#   VDI_COLORS_BY_PARTS  whether views of pvbatch --symmetric can colour by an array that only some ranks have; such a
+#                        run aborts: observed with ParaView 6.1, assumed from 6 on
+#   VDI_LOADS_STATES_ON_RANKS  whether pvbatch on several ranks can load a state; it hangs: observed with
+#                        ParaView 6.1, assumed from 6 on
 #   VDI_PLUGIN_UNITY   whether a unity build compiles the plugin's sources together
 
 # vdi_pass_over_python_modules(<folder of a ParaView's CMake files>): makes CMake accept Debian 13's

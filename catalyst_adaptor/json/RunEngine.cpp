@@ -61,7 +61,7 @@ stream::LiveOptions liveOptionsOf(const config::RunStream& run) {
           .programName = "vdi_catalyst"};
 }
 
-/// The size of a file in bytes; 0 for a device.
+/// The paths of the run's log.
 runlog::LogFiles logFilesOf(const config::RunLogFiles& names) {
   runlog::LogFiles files;
   if (!names.json.empty()) files.json = names.json;

@@ -1,7 +1,8 @@
 #pragma once
 // The differences among the versions of ParaView from 5.11 to 6.x. The code tests features rather than
-// version numbers where it can. The CMake half is cmake/ParaViewVersions.cmake. No other file asks for the
-// version of ParaView or VTK, as tests/IncludesTest.cmake checks.
+// version numbers where it can. The CMake half is cmake/ParaViewVersions.cmake. The two hold all tests of
+// versions and of C++ features, as tests/IncludesTest.cmake checks for versions. Other files list the names
+// of several versions where a look-up decides.
 
 #include <vtkPVVersion.h>
 #include <vtkType.h>
