@@ -1,4 +1,5 @@
 // Segments interleaved lists again, to at most N_S supersegments each. Their intervals are sub-supersegments.
+// Twin of composite in vdi/reference/Reference.cpp, together with interleave.comp.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/composite.h"

@@ -1,6 +1,6 @@
 // Puts the ranks' sub-supersegments of each list in order of depth, or composites them to one colour. Each
 // rank's supersegments are in order already, and no two overlap, so the next one is the nearest of the
-// remaining heads.
+// remaining heads. Twin of composite in vdi/reference/Reference.cpp, together with composite.comp.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared/composite.h"

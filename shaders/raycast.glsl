@@ -253,7 +253,7 @@ bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
         }
         useSample(span.x, span.y, it);
         rayOpticalDepth += it.opticalDepth;
-        if (rayOpticalDepth >= params.enough) return false;
+        if (rayOpticalDepth >= params.terminationOpticalDepth) return false;
       }
     }
     empty = false;

@@ -49,7 +49,7 @@ bool castLanes(Brick brick, uint begin, uint end) {
       vec2 span = spanOf(k, k);
       useSample(span.x, span.y, it);
       rayOpticalDepth += it.opticalDepth;
-      if (rayOpticalDepth >= params.enough) return false;
+      if (rayOpticalDepth >= params.terminationOpticalDepth) return false;
       unused = k + samplesAtOnce;
     }
   }

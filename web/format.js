@@ -1,6 +1,6 @@
 // Decodes .vdi files (docs/format.md). A file may be damaged or hostile. The decoder checks every
 // number before it uses it, and allocates only the memory that the file's bytes justify. Twin of
-// vdi/io/VdiFile.cpp and vdi/io/ListCodec.cpp.
+// VdiLayout.cpp, VdiDecoder.cpp, ListCodec.cpp and Metadata.cpp in vdi/io.
 
 import {lz4AnnouncedBytes, lz4Expand} from "./lz4.js";
 import {xxh64} from "./xxh64.js";

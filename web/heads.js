@@ -1,6 +1,6 @@
 // A list's head tells a ray where the list's supersegments are, and which of 60 parts of the VDI's
 // depth range they occupy. Tiles of 8 x 8 and of 64 x 64 lists have such masks, too. Twin of
-// shaders/expand.comp.
+// shaders/expand.comp, whose masks have 64 parts. Here a mask is two words of 30 bits.
 
 /** @typedef {import("./format.js").Vdi} Vdi */
 /** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */

@@ -68,7 +68,7 @@ struct CastParams {
   vec3 startUp;
   float reach;  // outermostReach
   vec3 directionBase;
-  float enough;  // optical depth at which a ray ends
+  float terminationOpticalDepth;  // a ray ends there
   vec3 directionRight;
   float coordinateError;  // bound on the rounding error of a position
   vec3 directionUp;

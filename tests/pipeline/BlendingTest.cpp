@@ -10,9 +10,9 @@
 #include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/Scenes.h"
+#include "tests/pipeline/AgainstReference.h"
 #include "tests/pipeline/Integral.h"
 #include "tests/pipeline/OpticalBounds.h"
-#include "vdi/comm/GhostExchange.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/SettingsTable.h"
 #include "vdi/pipeline/VdiGenerator.h"
@@ -50,7 +50,7 @@ void checkAgainstReference(VdiGenerator& generator, const Case& c) {
   const TransferFunction function = valley(top);
   const Camera camera = test::oblique(c.parallel);
   generator.setBlocks(decomposed.mine);
-  const auto blocks = comm::exchangeGhosts(comm::Communicator::serial(), decomposed.mine);
+  const auto blocks = test::withLayers(decomposed.mine);
   GenerateSettings settings = test::smallSettings(31, 23, 8);
   settings.shading.on = c.shaded;
   const auto composite = generator.renderVolume(camera, function, settings);
@@ -80,7 +80,7 @@ void checkAgainstReference(VdiGenerator& generator, const Case& c) {
 }  // namespace
 
 TEST_CASE("blending: extremes and isosurfaces of the device are the reference's") {
-  for (const auto& device : {test::device(), test::device(true)}) {
+  for (const auto& device : {test::device(), test::deviceAsGpu()}) {
     VdiGenerator generator(device, comm::Communicator::serial());
     checkAgainstReference(generator, {ScalarType::F32, Joint::SharedPoints, false, false});
     checkAgainstReference(generator, {ScalarType::U8, Joint::Cells, false, true});
@@ -115,7 +115,7 @@ TEST_CASE("blending: extremes and isosurfaces in double precision") {
     const test::OpticalScene scene = test::opticalScene(stretch, Joint::SharedPoints);
     VdiGenerator generator(test::device(), comm::Communicator::serial());
     generator.setBlocks(scene.mine);
-    const std::vector<Block> blocks = comm::exchangeGhosts(comm::Communicator::serial(), scene.mine);
+    const std::vector<Block> blocks = test::withLayers(scene.mine);
     const TransferFunction function = test::namedFunctions(stretch).front().function;
     for (Blending blending : modes(1.0)) {
       for (double& value : blending.isovalues) value = stretch.at(value);

@@ -90,7 +90,7 @@ shared::CastParams RayCaster::prepare(const Inputs& inputs) {
   params.cells = volume_.cells();
   params.ranges = volume_.cellRanges();
   params.nodeCount = volume_.nodeCount();
-  params.enough = terminationOpticalDepth(inputs.settings);
+  params.terminationOpticalDepth = terminationOpticalDepth(inputs.settings);
   params.budget = inputs.settings.supersegments;
   params.maxPerList = maxPerList(inputs.settings.supersegments, inputs.settings.budget);
   params.level = -1.0F;

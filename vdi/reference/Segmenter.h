@@ -1,7 +1,8 @@
 // Turns the intervals along one ray into supersegments: the exchangeable part of generation and compositing.
 // Generation feeds it samples, compositing feeds it sub-supersegments; both are intervals of constant colour
-// (paper, section 5.2). shaders/shared/segmenting.h has the constants. The shaders' twins are
-// shaders/segmenter.glsl and shaders/search.glsl.
+// (paper, section 5.2). shaders/shared/segmenting.h has the constants. The shaders' twins are segmenter.glsl
+// and search.glsl (bisection); pre_segments.glsl, merging.glsl, interpolate.comp, quota.comp and reduce.comp
+// (merging).
 #pragma once
 
 #include <array>
