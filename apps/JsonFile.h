@@ -17,7 +17,7 @@ nlohmann::json readJson(const std::filesystem::path& path);
 
 class JsonFile {
  public:
-  /// Throws Error: as readJson; Format if it is not one JSON object, or has a field outside
+  /// Throws Error as readJson does, and Error{Format} unless the text is one JSON object whose fields are all
   /// `known`.
   JsonFile(std::filesystem::path path, const std::set<std::string>& known);
 

@@ -53,7 +53,7 @@ void main() {
     return;
   }
   if (!hasList) return;
-  // A list that fits stays as it is: store.comp copies it from the interleaved lists.
+  // A list that fits stays unchanged: store.comp copies it from the interleaved lists.
   uint count = params.interleavedOffsets.at[listIndex + 1u] - params.interleavedOffsets.at[listIndex];
   bool fits = !byNeed && count <= params.budget;
   if (fits && countsPreSegments) {

@@ -53,8 +53,8 @@ vec2 insideFrustum() {
   vec2 stretch = vec2(0.0, uintBitsToFloat(0x7f7fffffu));
   bool parallel = params.parallel != 0u;
   vec2 halfSize = 0.5 * vec2(params.lists) * params.pixelSize;
-  // There is no loop over the axes, because lavapipe (Mesa 22.3) mixes up components of vectors that are
-  // indexed by a variable.
+  // The axes are written out, because lavapipe (Mesa 22.3) mixes up the components of a vector that a
+  // variable indexes.
   vec2 value = halfSize * (parallel ? 1.0 : ray.origin.z);
   vec2 slope = halfSize * (parallel ? 0.0 : ray.direction.z);
   clip(stretch, value.x - ray.origin.x, slope.x - ray.direction.x);

@@ -83,7 +83,7 @@ struct NamedFunction {
   glm::bvec3 lacks{false};  // channels
 };
 
-/// Places in [0, 1] with colours; and with opacities.
+/// Nodes of the two functions, at places in [0, 1].
 using Colors = std::vector<ColorNode>;
 using Opacities = std::vector<OpacityNode>;
 

@@ -232,8 +232,8 @@ export function between(a, b, share) {
   };
 }
 
-const DIGITS = 7;         // those of single precision
-const MOST_DIGITS = 17;   // those of double precision
+const DIGITS = 7;         // significant digits of single precision
+const MOST_DIGITS = 17;   // significant digits of double precision
 
 /**
  * A camera as text for a URL. Numbers have the digits of single precision. Positions have more

@@ -118,7 +118,7 @@ export class Decoder {
     else asked?.reject(new Error(answer.error));
   }
 
-  /** @param {Worker} worker one that has ended */
+  /** @param {Worker} worker a worker that has ended */
   fail(worker) {
     worker.terminate();
     this.worker = Promise.resolve(undefined);

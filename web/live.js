@@ -300,7 +300,7 @@ export class Live {
     if (this.wanted !== null && this.wanted < known) this.send({type: "show", index: this.wanted});
   }
 
-  /** @param {number} frame one that can't be shown @param {string} cause */
+  /** @param {number} frame a frame that can't be shown @param {string} cause */
   miss(frame, cause) {
     if (frame === this.wanted) this.missed = frame;
     const {heldBack} = this;
@@ -370,7 +370,7 @@ export class Live {
     this.isDecoding = true;
     while (this.waiting) {
       const {level, load, done} = this.waiting;
-      const {socket} = this;  // the level's connection, because another one begins without waiting levels
+      const {socket} = this;  // the connection that the level came by; a new connection starts without waiting levels
       this.waiting = undefined;
       done?.();
       if (this.holdBack(level, load)) continue;

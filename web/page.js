@@ -75,7 +75,7 @@ export class Page {
     this.ownBackground = false;
     /** @type {Promise<void> | undefined} of files that are being opened */
     this.opening = undefined;
-    /** The failure to open a file, shown while a server's frames go on. */
+    /** The failure to open a file, shown while a server's frames continue. */
     this.notice = "";
     /** @type {Camera | undefined} the latest camera of an unfinished motion to the VDI's viewpoint */
     this.homeward = undefined;
@@ -245,7 +245,7 @@ export class Page {
     const isWanted = () => this.live === live && !this.source && !live?.live.isHeldBack(level);
     let isShown = false;
     do {
-      while (this.opening) await this.opening;  // if no file is sound, the server's frames go on
+      while (this.opening) await this.opening;  // if no file is sound, the server's frames continue
       if (live?.live.state === "closed") return false;
       this.source = undefined;
       isShown = await viewer.setVdi(vdi, isWanted);

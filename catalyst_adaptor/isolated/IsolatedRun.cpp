@@ -26,7 +26,7 @@ namespace {
 
 constexpr std::chrono::milliseconds tick(20);  // between two agreements while ranks wait
 constexpr double startLimit = 300.0;           // seconds in which processes start, make a frame, or end a run
-constexpr double stopLimit = 2.0;              // seconds in which somebody may let stopped processes go on
+constexpr double stopLimit = 2.0;              // seconds in which somebody may let stopped processes continue
 constexpr std::chrono::milliseconds endLimit(10000);
 
 /// Collective: the maximum of each number over the ranks.

@@ -16,7 +16,8 @@ namespace vdi::catalyst {
 
 namespace {
 
-constexpr std::uint64_t page = 65536;  // a whole number of pages on every host, and of what devices import
+/// A multiple of every host's page size, and of the granularity at which devices import memory.
+constexpr std::uint64_t page = 65536;
 
 [[noreturn]] void throwNoRoom(std::uint64_t bytes, int error) {
   throw std::runtime_error("not enough memory for " + std::to_string((bytes >> 20) + 1) +

@@ -20,7 +20,7 @@
 namespace vdi::catalyst {
 
 /// All functions are collective unless their comments say otherwise. When one throws, it throws on all ranks,
-/// with Error{RemoteRank} or std::runtime_error if another rank reports more. The next frame is tried anew.
+/// with Error{RemoteRank} or std::runtime_error if another rank reports more. The next frame is tried again.
 class RunEngine {
  public:
   /// Not collective. `comm` is a duplicate of `fortranCommunicator`. `map` comes from the colours' file, if

@@ -36,8 +36,8 @@ class Agreement {
  private:
   enum class Place : std::int64_t { Entering, PartOver, StepOver };
   struct Meeting {
-    Place first;  // place of the rank that is least far
-    Place last;   // place of the rank that is farthest
+    Place first;  // place of the rank that has come least far
+    Place last;   // place of the rank that has come farthest
     bool failed;
     bool same;  // all ranks name the same operation
   };

@@ -100,7 +100,7 @@ class Pipeline : public vtkInSituPipeline {
   vtkTypeMacro(Pipeline, vtkInSituPipeline);
 
   void setScript(const Script& script) { script_ = script; }
-  /// Whether its script is loaded. A script that couldn't be loaded starts anew at the next step.
+  /// Whether its script is loaded. A script that couldn't be loaded starts again at the next step.
   bool loaded() const { return python_ != nullptr; }
   /// Whether the last step failed.
   bool failed() const { return failed_; }

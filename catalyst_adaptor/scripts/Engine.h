@@ -31,8 +31,8 @@ class Engine {
 
   /// Starts ParaView's engine. No other engine may have been started before. Scripts find `plugin`, the path
   /// of our plugin, as VDI_PLUGIN in os.environ. Throws std::runtime_error or std::bad_alloc if the engine
-  /// doesn't start. If that happens on any rank, another call on all ranks goes on where this one ended. For
-  /// an engine that has started it does nothing.
+  /// doesn't start. If that happens on any rank, another call on all ranks continues where this one ended.
+  /// For an engine that has started it does nothing.
   void start(int fortranCommunicator, const std::string& plugin);
 
   /// Whether the engine runs on the ranks of this communicator, in the same order, or hasn't been started.

@@ -44,7 +44,7 @@ void markGhosts(vtkImageData* image, const vdi_catalyst_block& block) {
   image->GetCellData()->AddArray(ghosts);
 }
 
-/// Calls `visit` with a number of the type that VTK has for it.
+/// Calls `visit` with a value of VTK's type for this scalar type.
 template <typename Visit>
 auto withNumber(int type, Visit visit) {
   switch (type) {

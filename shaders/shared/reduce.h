@@ -19,7 +19,7 @@ struct ReduceConstants {
   VDI_ADDRESS(UintArray) longLists;          // [lists]: lists that subgroups reduce, in any order
   VDI_ADDRESS(UintArray) longListCount;      // [1]: their number
   VDI_ADDRESS(SegmentArray) segments;
-  // Compositing: lists without pre-segments, which stay as they are; else 0
+  // Compositing: lists without pre-segments, which stay unchanged; else 0
   VDI_ADDRESS(SegmentArray) fitting;
   VDI_ADDRESS(UintArray) fittingOffsets;  // [lists + 1]: offsets of these
   // [1]: 0 if the supersegments do not fit, or the pre-segments are missing

@@ -86,7 +86,7 @@ cmp page.html again.html || fail "a page that can't be made replaces the old one
 refused 1 "No space" "$vdi" export one.vdi -o /dev/full
 refused 2 "overwrite" "$vdi" export one.vdi -o one.vdi
 refused 2 "required" "$vdi" export -o page.html
-# Lists beyond the picture's edges leave the picture as it is, and show what turning brings into view. At higher rates,
+# Lists beyond the picture's edges leave the picture unchanged, and show what turning brings into view. At higher rates,
 # rays that are set up from another pixel round differently, and a pixel may be off by 1/255.
 near=(--field turbulence "${small[@]}" --zoom 4 --sampling-rate 1)
 works "generate" "$vdi" generate "${near[@]}" -o cut.vdi --flat cut.png

@@ -1,6 +1,6 @@
 // Arrays in any layout, from random strides. Layouts are copied as a plain loop reads them, and those that
 // lead beyond the address space are refused. Each case has the same data in every run, for two
-// seconds. With VDI_FUZZ_SECONDS=600 it goes on with other data for that time. The test is also
+// seconds. With VDI_FUZZ_SECONDS=600 it continues with other data for that time. The test is also
 // meant to run under sanitizers.
 #include "catalyst_adaptor/StridedArray.h"
 

@@ -174,7 +174,7 @@ def restart():
 
 
 def stopped():
-    """Steps are left out while it is stopped, and the simulation goes on. The cause is reported, whichever rank has it."""
+    """Steps are left out while it is stopped, and the simulation continues. The cause is reported, whichever rank has it."""
     for stage, rank in (("writing", 0), ("taking", LAST)):
         run = Run({"output": stage + "_{timestep}.vdi"}, 10, **dying(stage, "stop", rank=rank))
         first = run.codes.index(SCRIPT)
@@ -234,7 +234,7 @@ def unreadable():
 
 
 def unnoted():
-    """If the first process can't map the pages with steps that were left out, the log lacks them, and frames go on."""
+    """If the first process can't map the pages with steps that were left out, the log lacks them, and frames continue."""
     run = Run({"isolation": {"patience": 0}, "resolution": [400, 300], "log": "run.jsonl"}, 20, VDI_TEST_SIZE="32",
               **dying("noting", "fail", 0))
     assert set(run.codes) == {0} and run.end == 0 and made(), run.codes

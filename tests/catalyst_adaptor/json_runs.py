@@ -53,7 +53,7 @@ def existing():
     assert made() == ["v_0.vdi", "v_2.vdi", "v_4.vdi"], made()
     first = written(made())
     refused(document, "v_0.vdi")
-    # After a restart from step 2, this and later steps are made anew, and earlier files stay.
+    # After a restart from step 2, this and later steps are made again, and earlier files stay.
     run({**document, "existing": "continue"}, *5 * [0], VDI_TEST_FIRST="2")
     assert made() == ["v_0.vdi", "v_2.vdi", "v_4.vdi", "v_6.vdi"], made()
     again = written(made())

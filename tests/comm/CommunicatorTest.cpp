@@ -309,7 +309,7 @@ TEST_CASE("more elements than MPI counts: every rank throws, nothing is sent") {
 }
 
 #ifndef __SANITIZE_ADDRESS__
-TEST_CASE("a rank without enough memory makes all fail, and all go on") {
+TEST_CASE("a rank without enough memory makes all fail, and all continue") {
   const Communicator world = Communicator::world();
   const int poor = world.size() - 1;
   constexpr std::size_t room = 64ULL << 20;

@@ -355,7 +355,7 @@ TEST_CASE("a neighbour's values replace the caller's ghost layers, which stay at
   CHECK(valueAt(block, 8, 4, 4) == Approx(linear(left.origin + glm::dvec3(8, 4, 4) * left.spacing)));
 }
 
-TEST_CASE("the caller's ghost layers at the domain's edge are used as they are") {
+TEST_CASE("the caller's ghost layers at the domain's edge are used unchanged") {
   const Communicator world = Communicator::world();
   const auto field = [](const glm::dvec3& p) { return p.x > 1.0 ? 7.0 : linear(p); };
   Block block = blockIn(Kind::Cells, {glm::dvec3(0.0), {1.25, 1.0, 1.0}}, {10, 8, 8}, ScalarType::F64, field);

@@ -14,7 +14,7 @@ GenerateSettings settingsOf(int width, int height, std::uint32_t supersegments) 
   return settings;
 }
 
-/// A fifth of what the lists may hold.
+/// A fifth of the supersegments that the lists may hold.
 MadeVdi made() {
   return {.settings = settingsOf(100, 50, 20),
           .lists = 5000,

@@ -54,7 +54,7 @@ def follow():
         elif len(waits) == 15:
             simple.SaveScreenshot("second.png", simple.GetActiveView())
             simple.GetActiveView().GetInteractor().TerminateApp()
-        assert len(waits) < 20, "the program goes on after its window is closed"
+        assert len(waits) < 20, "the program continues after its window is closed"
 
     time.sleep = sleep
     sys.argv[1:] = ["."]

@@ -40,7 +40,7 @@ TEST_CASE("a Cinema index has a line for each picture") {
   CHECK(database.text() == "time,phi,theta,FILE\n1,60,-45,a.png\n0.5,0.1,0,b.png\n");
 }
 
-TEST_CASE("a Cinema index goes on with an existing one, or begins anew") {
+TEST_CASE("a Cinema index continues an existing one, or begins again") {
   const Database database;
   database.write("time,phi,theta,FILE\r\n0,0,0,a.png\n\n1,0,0,b.png");
   io::CinemaIndex kept(database.folder, true);

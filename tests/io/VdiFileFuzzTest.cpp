@@ -1,6 +1,6 @@
 // Damaged .vdi files, the same ones in every run: each must be refused with Error{Format}. A file whose
 // checksums were recomputed may pass, but must give a VDI that validate() accepts. With
-// VDI_FUZZ_SECONDS=600, the last case goes on with other files for that time. The test is also
+// VDI_FUZZ_SECONDS=600, the last case continues with other files for that time. The test is also
 // meant to run under sanitizers.
 #include <sys/resource.h>
 #include <sys/wait.h>

@@ -1,5 +1,5 @@
 // The page's decoder on sound, damaged and hostile files: it decodes, or throws FormatError. $1:
-// vdi. With VDI_FUZZ_SECONDS=600, it goes on with other damage for that time.
+// vdi. With VDI_FUZZ_SECONDS=600, it continues with other damage for that time.
 import {execFileSync} from "node:child_process";
 import {mkdtempSync, readFileSync, rmSync} from "node:fs";
 import {tmpdir} from "node:os";

@@ -70,7 +70,7 @@ def test_frames(browser):
         browser.value(f"vdiPage.setCamera({json.dumps(turned)})")
         make("run/step_1.vdi", 2)
         wait_for_frame(browser, 1)
-        check(camera_of(browser)["position"] == turned["position"], "a new frame leaves the view as it is")
+        check(camera_of(browser)["position"] == turned["position"], "a new frame leaves the view unchanged")
         compare("live, turned", shown(browser, "live_turned"), rendered("run/step_1.vdi", turned))
 
         # A frame that arrives while the GPU's context is lost is shown once it is restored.

@@ -217,7 +217,7 @@ async function testConnection() {
   const ends = sockets[0].sent.filter((m) => m.type === "ack");
   check(ends.length === 2 && ends[1].frame === 7 && ends[1].level === 1 && ends[1].bytes === 4, "acknowledgements of levels' ends");
 
-  // Of the levels that arrive while one is decoded, only the newest is shown.
+  // The page shows only the newest of the levels that arrive while it decodes one.
   for (let i = 3; i < 9; ++i) sendLevel(sockets[0], 8 + i, 0, i);
   await soon(60);
   check(shown.join() === "1,2,3,8", `newest wins: ${shown}`);

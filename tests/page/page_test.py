@@ -158,7 +158,7 @@ def test_culling_parallel(browser):
 
 
 def test_hands(browser):
-    views = []  # vdi render makes the expected pictures while the test goes on
+    views = []  # vdi render makes the expected pictures while the test continues
 
     def look(what):
         expected = rendering("compact.vdi", camera_of(browser))

@@ -255,7 +255,7 @@ function testPan() {
   check(isNear(wide.place([0, 0, 0]), 230, 130), `material follows a mouse in a wide window: ${wide.place([0, 0, 0])}`);
 }
 
-/** However far a user zooms in, the view can be kept in a link, and goes on from there. */
+/** However far a user zooms in, the view can be kept in a link, and continues from there. */
 function testZoom() {
   for (const focalPoint of [[0, 0, 0], [5, -3, 2], [448000, 5411000, 100]]) {
     for (const more of [{}, {parallel: true, parallelScale: 40}]) {
@@ -494,7 +494,7 @@ async function testWrongFile() {
   const level = page.takeLevel(vdiFrom(1), {frame: 1});
   await wrong;
   check(message().includes("invalid .vdi file"), `a wrong file: ${message()}`);
-  check(await level && page.frame === 1 && page.live.live.state === "live" && !page.source, "the server's frames go on");
+  check(await level && page.frame === 1 && page.live.live.state === "live" && !page.source, "the server's frames continue");
   check(message().includes("invalid .vdi file"), "the message can be read");
   clock.pass(6000);
   check(message() === "", `the message goes: ${message()}`);

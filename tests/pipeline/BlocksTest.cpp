@@ -13,7 +13,7 @@ using test::device;
 using test::largestDifference;
 
 TEST_CASE(
-    "values that are copied as they are and values that are staged, several buffers full, give one picture") {
+    "values that are copied unchanged and values that are staged, several buffers full, give one picture") {
   // Both give equal texels: those of i16 are shifted up.
   const glm::ivec3 size{262, 261, 260};
   std::vector<std::uint16_t> values;

@@ -172,7 +172,7 @@ TEST_CASE("macrocells that rays pass and samples that are counted as one: as in 
   }
 }
 
-TEST_CASE("rays go on behind material of opacity 1, unless they must end") {
+TEST_CASE("rays continue behind material of opacity 1, unless they must end") {
   const auto decomposed = test::onOneRank("shells", {32, 32, 32});
   TransferFunction function = test::threeHues(1.0);
   function.opacities = {{0.0, 0.0}, {0.5, 0.0}, {0.6, 1.0}, {1.0, 1.0}};

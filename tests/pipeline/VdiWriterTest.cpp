@@ -188,7 +188,7 @@ TEST_CASE("a rank writes its own lists, and sends no more than parts of chunks")
   }
 }
 
-TEST_CASE("a pipe gets the bytes in their order, a device what it takes") {
+TEST_CASE("a pipe gets the bytes in their order, and a full device is an error") {
   const test::SharedFolder folder(world());
   const fs::path pipe = folder.path() / "pipe";
   const Vdi vdi = test::colored(test::noisyVdi(97, 131, 5));

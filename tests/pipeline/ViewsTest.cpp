@@ -52,7 +52,7 @@ TEST_CASE("rays leave a picture within a tile of lists, through material at its 
     renderer.setVdi(*vdi);
     for (const double angle : {120.0, 160.0, 200.0, 240.0}) {
       INFO(angle);
-      // There are many rays: rounding lets a few of them pass the last list.
+      // Rounding lets a few of the many rays pass the last list.
       const Image seen = renderer.render(camera.azimuth(angle), 160, 160);
       const auto isSound = [](const glm::vec4& p) { return p.a >= 0.0F && p.a <= 1.0F && p.r >= 0.0F; };
       CHECK(std::all_of(seen.rgba.begin(), seen.rgba.end(), isSound));
@@ -156,7 +156,7 @@ TEST_CASE("rays that end at objects, of any part of an image plane: as in the re
     const View part(other, width, height,
                     ImagePlane{glm::dvec2(-0.9, -0.4) * half, glm::dvec2(0.3, 0.6) * half});
     for (const View& view : {whole, part}) {
-      // A slanted wall through the middle of the scene; to its left rays go on, to its right they end at
+      // A slanted wall through the middle of the scene; to its left rays continue, to its right they end at
       // once.
       const double middle = view.depthOf(vdi.bounds.center());
       const double depth = glm::length(vdi.bounds.size());

@@ -42,7 +42,7 @@ for name, (layout, kind, as_cells, scale) in VARIANTS.items():
         worst = np.abs(ours.astype(int) - truth).max()
         # Straight colour and opacity are bytes, each within 1 of one rank's: over black that makes 2.
         check(worst <= 2, "%s: the flat picture equals one rank's, worst channel off by %d" % (name, worst))
-        # Colour and alpha are rounded separately, so that a twentieth of a step can become two.
+        # Colour and alpha are rounded separately, so a difference of a twentieth of a step can become two steps.
         off = np.abs(from_vdi.astype(int) - truth)
         check(off.max() <= 2 and off.mean() < 0.05,
               "%s: the VDI rendered from its own viewpoint equals one rank's picture, off by %d at most, "

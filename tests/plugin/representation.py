@@ -134,7 +134,7 @@ def column_of(picture):
 
 
 def window_column(view, source):
-    """The column of the source in the window itself, because ParaView takes screenshots without stereo."""
+    """The column of the source in the window itself: screenshots of ParaView have no stereo."""
     simple.Show(source, view)
     simple.Render(view)  # the first picture of a view moves its camera
     view.CameraPosition, view.CameraFocalPoint, view.CameraViewUp = CAMERA, CENTER, [0, 1, 0]

@@ -132,7 +132,7 @@ TEST_CASE("a start that has no room leaves no file that it has made, and those t
   CHECK(readRecords(fresh).starts.size() == 1);
 }
 
-TEST_CASE("a log begins anew where it is told to, and has what was left out") {
+TEST_CASE("a log starts over where it is told to, and has what was left out") {
   const test::TemporaryFolder folder;
   const fs::path json = folder.path() / "run.jsonl";
   const fs::path text = folder.path() / "run.log";

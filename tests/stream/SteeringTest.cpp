@@ -36,7 +36,7 @@ Hub::Options options(Taken& taken) {
   return result;
 }
 
-/// A viewer that has said hello, and what it has been sent since it was last asked.
+/// A viewer that has said hello. `heard` returns the messages since its last call.
 class Seat {
  public:
   explicit Seat(Hub& hub) : viewer_(hub, [] {}) { say(Hello{1, token, std::nullopt, std::nullopt}); }
@@ -105,7 +105,7 @@ TEST_CASE("one viewer drives, and the others see who") {
   CHECK(first->last<Steering>()->driver == 2U);
   second.say(Release{});
   first->say(Drive{});
-  // A simulation that a driver has paused goes on when the driver leaves.
+  // A simulation that a driver has paused continues when the driver leaves.
   Wish pause;
   pause.paused = true;
   first->say(Steer{pause});
@@ -196,7 +196,7 @@ TEST_CASE("what wasn't taken is merged, and the later wish wins") {
   CHECK(
       logEntryOf(*request, 12, 0.5) ==
       R"({"step":12,"time":0.5,"viewer":2,"steer":{"period":5,"paused":false,"parameters":{"feed":0.02,"kill":0.5}}})");
-  CHECK(summaryOf(request->wish) == "feed = 0.02, kill = 0.5, a VDI every 5 steps, go on");
+  CHECK(summaryOf(request->wish) == "feed = 0.02, kill = 0.5, a VDI every 5 steps, continue");
   Wish sampled;
   sampled.samplingRate = 0.5;
   CHECK(wishOf(textOf(sampled)) == sampled);

@@ -160,7 +160,7 @@ TEST_CASE("what stalled viewers keep is bounded, and the oldest goes first") {
     CHECK(hub.heldBytes() <= limit);
     CHECK(levels.bytesAlive() <= limit + coarseBytes + fullBytes);
     stalled.push_back(std::make_unique<Connected>(hub, now));
-    REQUIRE(stalled.back()->part(now));  // which never arrives
+    REQUIRE(stalled.back()->part(now));  // this part never arrives
     good.takeAll(now);
   }
   CHECK_FALSE(good.viewer.isStalled());

@@ -236,7 +236,7 @@ std::vector<std::string> saidMessages(const stream::Wish& wish) {
   return texts;
 }
 
-/// A viewer's whole conversation, without a network, and what the simulation does with its wishes.
+/// A viewer's whole conversation, without a network; the simulation takes the viewer's wishes.
 void converse(const std::vector<std::string>& said, const stream::Controls& controls,
               const stream::FramePtr& frame) {
   stream::Wishes wishes;

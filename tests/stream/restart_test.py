@@ -63,7 +63,7 @@ with tempfile.TemporaryDirectory() as name:
         before = frames()
         again = start(program, run)
         until(lambda: frames() >= before + 2, "frames of the run that started again")
-        check(receiver.poll() is None, "the viewer goes on")
+        check(receiver.poll() is None, "the viewer continues")
         check(link.stat().st_ino != dead, "the new run replaces the link that the killed one left")
         check(link.stat().st_mode & 0o777 == 0o600, "only its owner can read the link")
     finally:

@@ -100,7 +100,7 @@ def drive(port, token, folder):
     check(steering(other, lambda message: values(message)["waves"] == 5)["driver"] == me["you"], "others see what is in force")
     level(driver, lambda announced: announced["width"] == 120)
 
-    # While the simulation waits, its last step is made anew for a new view, and no other step comes.
+    # While the simulation waits, its last step is made again for a new view, and no other step comes.
     driver.send(type="steer", paused=True)
     steering(driver, lambda message: message["paused"])
     time.sleep(0.5)
@@ -112,11 +112,11 @@ def drive(port, token, folder):
     again = level(driver, lambda announced: announced["width"] == 64)
     # An isolated simulation may be two steps ahead of the frame that waits.
     ahead = int(before[-1].split()[0]) - again["step"]
-    check(0 <= ahead <= (2 if ISOLATED else 0), "the step that waits is made anew, and not %d steps later" % ahead)
+    check(0 <= ahead <= (2 if ISOLATED else 0), "the step that waits is made again, and not %d steps later" % ahead)
     driver.send(type="steer", parameters={"level": 0.125})
     steering(driver, lambda message: values(message)["level"] == 0.125)
     check(lines(folder / "parameters_0.txt") == before, "the simulation waits")
-    # When a driver leaves, the simulation goes on, and the next viewer may drive.
+    # When a driver leaves, the simulation continues, and the next viewer may drive.
     driver.close()
     steering(other, lambda message: message["driver"] is None and not message["paused"])
     other.send(type="drive")

@@ -453,7 +453,7 @@ class Window:
 
     def is_making(self, panel):
         """Whether the panel says that the VDI is made anew. It looks only in `panel`, because a small VDI is soon made."""
-        return self.text_that_begins("Making the VDI anew", panel) is not None
+        return self.text_that_begins("Regenerating the VDI", panel) is not None
 
     def save(self, item, name, picture=None, extension=""):
         """Saves by an item of the menu File. Without a server, `name` may be relative to the folder in which ParaView

@@ -80,7 +80,7 @@ class Continuation {
   }
 
  private:
-  /// There are many, so each is small.
+  /// A place still to be filled. It is kept small, because a block may have many.
   struct OpenPlace {
     std::size_t position;  // in the patch's window
     std::uint32_t patch;

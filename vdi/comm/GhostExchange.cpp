@@ -34,7 +34,7 @@ constexpr double indexTolerance = 0.01;
 /// The most finer values per axis that a mean uses, even if there are more.
 constexpr int maxParts = 16;
 
-/// Closed gaps and `reach` are within this number of layers around the stored values.
+/// Gaps that are closed, and values up to `reach`, lie within this many layers around the stored values.
 constexpr int maxLayers = 3;
 
 glm::ivec3 indexOf(const glm::dvec3& index, const Block& block) {

@@ -15,7 +15,7 @@ void check(int result, const char* call);
 /// An MPI operation that a thread within a Funnel requests.
 struct Operation {
   /// Begins the operation, by calls that do not wait for other ranks, and adds the requests that complete it.
-  /// There is always memory for one request.
+  /// The vector always has room for one request.
   FunctionRef<int(std::vector<MPI_Request>&)> begin;
 
   /// Whether this thread is within a Funnel.

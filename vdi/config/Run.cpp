@@ -82,10 +82,11 @@ void requireNothingInTheWay(const Run& run) {
   if (run.existing != Existing::Refuse) return;
   const std::optional<std::filesystem::path> file = run.firstExisting();
   if (!file) return;
-  throw Error(ErrorCode::Io,
-              "a file of another run is in the way; \"existing\": \"continue\" goes on after a restart, "
-              "\"existing\": \"overwrite\" begins anew",
-              file->string());
+  throw Error(
+      ErrorCode::Io,
+      "a file of another run is in the way; \"existing\": \"continue\" continues that run after a restart, "
+      "\"existing\": \"overwrite\" starts over",
+      file->string());
 }
 
 double periodsIn(double time, double period) {

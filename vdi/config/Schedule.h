@@ -12,7 +12,7 @@ namespace vdi::config {
 /// A frame is due
 /// - at multiples of `every` steps;
 /// - at the first step at or after each multiple of `everyTime`, at most a millionth of it early, so that a
-///   restart goes on with the same frames;
+///   restart continues with the same frames;
 /// - at the first step that comes `everySeconds` or more after the last step that was due by this rule.
 /// At the simulation's first step, the last two conditions hold.
 class Schedule {

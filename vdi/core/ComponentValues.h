@@ -42,7 +42,7 @@ std::size_t sizeOf(ComponentType type);
 double loadComponent(ComponentType type, const void* data, std::size_t index);
 
 /// Makes the block show `component` of the array, which has a value at each of the block's places. Values are
-/// read in place, so the array must outlive the block. One component of a ScalarType is read as it is; all
+/// read in place, so the array must outlive the block. One component of a ScalarType is read unchanged; all
 /// else is computed as f64 at each read. `component` is a number below array.components, `magnitude`, or
 /// `phase` with two components; of a single component, `magnitude` is the component itself.
 void showComponent(Block& block, const ComponentArray& array, int component);

@@ -35,7 +35,7 @@ bool environmentFlag(const char* name);
 /// "off", or none of these is set.
 std::string cacheFolder();
 
-/// Why VDI_CACHE's folder can't take data, for a warning: runs go on without it. Empty if it can, or the
+/// Why VDI_CACHE's folder can't take data, for a warning: runs continue without it. Empty if it can, or the
 /// variable names no folder. Creates the folder if necessary.
 std::string cacheIssue();
 

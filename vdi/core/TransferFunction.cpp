@@ -18,8 +18,8 @@ constexpr std::size_t smallestTable = 1024;
 constexpr std::size_t tableOfSteps = 4096;
 constexpr std::size_t largestTable = 16384;
 
-/// Piecewise linear through nodes in ascending x; `valueOf` reads a node's value. Of two nodes at x, the
-/// later one counts.
+/// Piecewise linear through nodes in ascending x; `valueOf` reads a node's value. If two nodes have the
+/// same x, the later one counts.
 template <typename Node, typename ValueOf>
 auto piecewiseLinear(const std::vector<Node>& nodes, double x, ValueOf valueOf) {
   assert(!nodes.empty());
@@ -160,8 +160,8 @@ double entrySpacing(const TransferTable& table) {
   return (table.max - table.min) / static_cast<double>(table.entries.size() - 1);
 }
 
-/// Of two nodes at one scalar, the later one counts. The table's ramp for a step must end at or before the
-/// step, so the entry before the step gets the value behind it.
+/// If two nodes have the same scalar, the later one counts. The table's ramp for a step must end at or before
+/// the step, so the entry before the step gets the value behind it.
 void fillFine(const TransferFunction& function, const std::vector<double>& steps, TransferTable& table) {
   for (std::size_t i = 0; i < table.entries.size(); ++i) {
     double x = scalarOf(table, i);
@@ -171,7 +171,7 @@ void fillFine(const TransferFunction& function, const std::vector<double>& steps
   }
 }
 
-/// Features narrower than an entry count by their mean, so that no ray misses them.
+/// A feature narrower than an entry contributes its mean, so no ray misses it.
 void fillCoarse(const TransferFunction& function, TransferTable& table) {
   std::vector<double> nodes;
   for (const ColorNode& node : function.colors) nodes.push_back(node.x);

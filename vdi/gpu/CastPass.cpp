@@ -104,7 +104,7 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
                                 : algorithm == Algorithm::Bisection ? shared::castProgramSearch
                                 : writes                            ? shared::castProgramWritePreSegments
                                                                     : shared::castProgramCountPreSegments;
-  // Of these programs, only the search stores supersegments.
+  // Only the search program stores supersegments.
   const std::uint32_t encoding = program == shared::castProgramSearch ? band.form.encoding : 0;
   const shared::CastConstants constants{writes ? shared::castModeWrite : shared::castModeSearch,
                                         band.firstRow, band.lastRow};

@@ -110,7 +110,7 @@ class Commands {
   /// Fills a new image with zeros and makes it ready to be sampled. Texels without data would otherwise hold
   /// anything, NaN included, and a NaN spoils its neighbours even with weight 0.
   void clear(const SampledImage& image);
-  /// Makes an image that is ready to be sampled ready for copyToImage; its texels stay as they are.
+  /// Makes an image that is ready to be sampled ready for copyToImage; its texels stay unchanged.
   void beginUpload(const SampledImage& image);
   /// Makes the image ready to be sampled again.
   void endUpload(const SampledImage& image);

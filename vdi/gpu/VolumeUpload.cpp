@@ -71,7 +71,7 @@ std::optional<Pitches> pitchesOf(const Block& block) {
 }
 
 /// Converts `count` values to texels. The unsigned integer formats shift signed values up. The float format
-/// is relative to the block's range, except for f32, which is stored as it is unless it is infinite.
+/// is relative to the block's range, except for f32, which is stored unchanged unless it is infinite.
 template <typename From, typename To, typename Convert>
 void convertRow(const void* from, std::size_t first, std::size_t count, std::byte* to, Convert convert) {
   const auto* values = static_cast<const From*>(from) + first;

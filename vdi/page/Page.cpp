@@ -90,7 +90,7 @@ struct Shell {
   std::string after;
 };
 
-/// `connect`: what the page may connect to, in terms of a Content-Security-Policy.
+/// `connect`: the value of connect-src in the page's Content-Security-Policy.
 Shell shellOf(const std::string& title, std::string_view connect) {
   constexpr std::string_view titlePlace = "@TITLE@";
   constexpr std::string_view dataPlace = "@DATA@";

@@ -28,7 +28,7 @@ class Compositor {
     float level = -1.0F;  // with Budget::Total, from the histogram of all owners
   };
 
-  /// Puts all ranks' supersegments of some lists in order of depth. The device goes on after this returns:
+  /// Puts all ranks' supersegments of some lists in order of depth. The device continues after this returns:
   /// `parts` and `interleaved` must stay until `finish`. The transfer queue copies the received lists while
   /// the device computes. `behind` records the steps that follow.
   void interleave(const Distributed& parts, const ListForm& form, DeviceLists& interleaved,
@@ -36,11 +36,11 @@ class Compositor {
 
   /// The histogram of these lists. Waits for the submitted work.
   SupersegmentHistogram histogram(const DeviceLists& interleaved, const Options& options);
-  /// Makes lists of at most `maxPerList` supersegments. The device goes on after this returns; `interleaved`
-  /// and `lists` must stay until `finish`.
+  /// Makes lists of at most `maxPerList` supersegments. The device continues after this returns;
+  /// `interleaved` and `lists` must stay until `finish`.
   void composite(const DeviceLists& interleaved, const Options& options, DeviceLists& lists);
   /// Composites each list to a pixel of the flat picture, as [listCount] glm::vec4 and [listCount] float. The
-  /// device goes on after this returns.
+  /// device continues after this returns.
   void flatten(const DeviceLists& interleaved, const ListForm& form, gpu::Buffer& colors,
                gpu::Buffer& depths);
   /// Waits for the submitted work; then `lists` are complete. Throws as ListBuilder::finish does.

@@ -42,7 +42,7 @@ class ParticleDepositor {
 
   /// Collective. `kind` is the same on all ranks. Throws on all ranks: Error{OutOfMemory},
   /// Error{DeviceFailure}, and Error{InvalidArgument} for values beyond those of f32. After an error the
-  /// next call starts anew.
+  /// next call starts again.
   DepositedArray deposit(const Particles& particles, DepositKind kind);
 
  private:

@@ -175,7 +175,7 @@ struct VdiGenerator::State {
             settings,       comm.size() > 1, runsOnly,         form};
   }
 
-  /// Runs the work of a frame. After an error, no work may go on in memory that the next frame takes, so
+  /// Runs the work of a frame. After an error, no work may continue in memory that the next frame takes, so
   /// frames that were started before fail too.
   template <typename Work>
   void frame(Work work) {

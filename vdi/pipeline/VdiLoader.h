@@ -45,9 +45,9 @@ class VdiLoader {
  public:
   explicit VdiLoader(std::shared_ptr<gpu::Device> device);
 
-  /// Alone: the loader has the device to itself. Beside: renders go on meanwhile.
+  /// Alone: the loader has the device to itself. Beside: renders continue meanwhile.
   enum class Kind { Alone, Beside };
-  /// Copies the VDI. Alone, the device goes on after this returns (for VDIs of up to 128 MiB; larger ones
+  /// Copies the VDI. Alone, the device continues after this returns (for VDIs of up to 128 MiB; larger ones
   /// wait for all but their last part). With Kind::Beside, the VDI is loaded when this returns.
   void load(const Vdi& vdi, LoadedVdi& target, Kind kind);
 
@@ -56,7 +56,7 @@ class VdiLoader {
   void begin(const Vdi& header, LoadedVdi& target);
   /// Adds a complete band. Returns the submission that uses its memory.
   gpu::Submission add(const DeviceLists& band, std::uint64_t firstList);
-  /// Call after the last band. The device goes on after this returns.
+  /// Call after the last band. The device continues after this returns.
   void finish();
 
   /// Waits until the last VDI is loaded.

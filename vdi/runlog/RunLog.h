@@ -1,4 +1,4 @@
-// Writes a run's log while the run goes on.
+// Writes a run's log during the run.
 #pragma once
 
 #include <chrono>

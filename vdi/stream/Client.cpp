@@ -189,7 +189,7 @@ class Client::Impl {
     if (shown_ && *shown_ >= from && *shown_ < series_.size()) send(Show{*shown_});
   }
 
-  /// Runs `work` on what the server sent. An error in `work` makes this client fail.
+  /// Runs `work`, which handles a message of the server. An error in `work` makes this client fail.
   template <typename Work>
   void guarded(Work work) {
     try {

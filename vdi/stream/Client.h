@@ -18,7 +18,7 @@ namespace vdi::stream {
 struct ClientOptions {
   Url url;  // with a token
   /// A command for `sh -c`, used instead of the link. It must connect its standard input and output to a
-  /// server, as "ssh host vdi serve --stdio folder" does. Each connection runs it anew.
+  /// server, as "ssh host vdi serve --stdio folder" does. Each connection runs it again.
   std::string command;
   /// PEM file of certificates to trust besides the system's.
   std::filesystem::path authority;
@@ -50,7 +50,7 @@ class Client {
   std::optional<Received> next(std::chrono::milliseconds timeout);
 
   struct Standing {
-    bool isConnected = false;                     // and welcomed by the server
+    bool isConnected = false;                     // connected, and the server has said welcome
     std::string session;                          // of the last connection
     State state;                                  // the last that the server sent
     bool hasState = false;                        // the last connection has sent `state`, after its series

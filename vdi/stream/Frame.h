@@ -45,7 +45,7 @@ std::vector<int> coarseFactorsOf(std::uint64_t bytes);
 /// Encodes a VDI, on all cores. Calls `take` on this thread: with the coarse levels, if there are any, and
 /// with all levels. After the coarse ones, it asks `goesOn` repeatedly whether to encode the whole
 /// VDI, and stops once the answer is false. Throws Error{Format} for a VDI that io::decode would
-/// refuse, and what the two functions throw.
+/// refuse, and the exceptions of both functions.
 void encodeFrame(const Vdi& vdi, std::uint32_t id, Clock::time_point made,
                  const std::function<void(FramePtr)>& take, const std::function<bool()>& goesOn);
 /// Makes a frame of a VDI's file, whose bytes become the last level as they are. Checks all of the file

@@ -24,7 +24,7 @@ class Outbox {
   void offer(FramePtr frame, Clock::time_point now);
   /// Notes that the viewer already has all of `frame`.
   void skip(FramePtr frame);
-  /// While paused, next() begins no level. A level under way goes on.
+  /// While paused, next() begins no level. A level under way continues.
   void pause(bool paused) { isPaused_ = paused; }
 
   /// A part of a level; at offset 0 the level begins.

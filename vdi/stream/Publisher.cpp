@@ -11,7 +11,7 @@ namespace vdi::stream {
 namespace {
 
 /// Lets this thread, and those that it starts, yield to others. Linux has a niceness for each thread. A
-/// thread that yields more already stays as it is.
+/// thread that yields more already stays unchanged.
 void giveWay() {
   constexpr int niceness = 10;
   const auto thread = static_cast<id_t>(::gettid());

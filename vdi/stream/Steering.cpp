@@ -87,7 +87,7 @@ std::string summaryOf(const Wish& wish) {
   if (wish.range)
     parts.push_back(fmt::format("colours from {:.6g} to {:.6g}", (*wish.range)[0], (*wish.range)[1]));
   if (wish.period) parts.push_back(fmt::format("a VDI every {} steps", *wish.period));
-  if (wish.paused) parts.emplace_back(*wish.paused ? "pause" : "go on");
+  if (wish.paused) parts.emplace_back(*wish.paused ? "pause" : "continue");
   return fmt::format("{}", fmt::join(parts, ", "));
 }
 

@@ -54,12 +54,12 @@ struct Controls {
   bool operator==(const Controls&) const = default;
 };
 
-/// A viewer's request. Fields that it leaves out stay as they are.
+/// A viewer's request. Fields that it leaves out stay unchanged.
 struct Wish {
   std::optional<Camera> camera;                  // a viewpoint V_O that View accepts
   std::optional<std::array<int, 2>> resolution;  // 1 to View::maxSide
   std::optional<int> supersegments;              // 1 to vdi::maxSupersegments
-  std::optional<double> samplingRate;            // what the table of settings allows
+  std::optional<double> samplingRate;            // within the range of the table of settings
   std::optional<std::array<double, 2>> range;    // finite, rising
   std::optional<std::string> preset;             // one of GeneratorControls::presets
   std::optional<int> period;                     // 1 to maxPeriod

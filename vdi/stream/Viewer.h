@@ -72,7 +72,7 @@ class Hub {
   friend class Viewer;
   void wakeAll();
   bool canSteer() const { return static_cast<bool>(options_.steer); }
-  /// Ends the driver's control. If the driver has paused the simulation, lets it go on.
+  /// Ends the driver's control. If the driver has paused the simulation, lets it continue.
   void endDrive();
   std::set<std::shared_ptr<const EncodedLevel>> heldFor(const Viewer& viewer) const;
   void limitHeld(Clock::time_point now);

@@ -189,7 +189,7 @@ class Worker {
         },
         notice.step);
     if (code != VDI_CATALYST_OK) {
-      data = {};  // parameters stay as they are on all ranks
+      data = {};  // parameters stay unchanged on all ranks
       error = reading_.error.substr(0, longestText);
     } else {
       reading_.printed.clear();

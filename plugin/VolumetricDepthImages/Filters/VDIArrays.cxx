@@ -49,7 +49,8 @@ bool has(vtkDataSetAttributes* attributes, const std::string& name) {
 /// The blocks of a data set, those that have the array and those that lack it.
 struct Holders {
   int with = 0;
-  std::string missing;  // says what the first block without the array has; empty if there is none
+  std::string
+      missing;  // names the arrays of the first block that lacks this one; empty if every block has it
 };
 
 void count(vtkDataObject* leaf, const ArrayChoice& choice, Holders& holders) {

@@ -24,7 +24,7 @@ struct ArrayChoice {
 /// values where VTK, or the simulation, has them. Only VTK arrays of bits, and those without the standard
 /// memory layout, are copied. A block doesn't own cells that vtkGhostType marks as duplicate, refined or
 /// hidden, nor cells with a hidden point. It masks the values of refined and hidden cells and of hidden
-/// points. Levels of AMR data stay as they are: once the blocks of all ranks meet, the finest level owns the
+/// points. Levels of AMR data stay unchanged: once the blocks of all ranks meet, the finest level owns the
 /// overlap. Throws vdi::Error{InvalidArgument} for a data set other than vtkImageData, a rotated image, a
 /// component that the array lacks, and an array or a vtkGhostType that is shorter than the image.
 std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice);

@@ -1,8 +1,8 @@
 // The event by which a collective operation asks for permission to start. An observer that watches over the
 // ranks' scripts grants it.
 //
-// A script that ends on one rank while the others go on leaves them in a collective operation that it never
-// enters. catalyst_adaptor detects such scripts, and observes `event` on the global
+// A script that ends on one rank while the others continue leaves them in a collective operation that it
+// never enters. catalyst_adaptor detects such scripts, and observes `event` on the global
 // vtkMultiProcessController. Without an observer, every entry is granted. This header is free of VTK and MPI,
 // because catalyst_adaptor shares it and doesn't link the plugin.
 #ifndef VDICollective_h

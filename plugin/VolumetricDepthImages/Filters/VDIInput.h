@@ -1,4 +1,4 @@
-// What a filter requests of its input, and how it tells the input's blocks from others.
+// The request that a filter makes of its input, and the origin that identifies the input's blocks.
 #ifndef VDIInput_h
 #define VDIInput_h
 

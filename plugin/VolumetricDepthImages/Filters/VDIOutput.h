@@ -1,4 +1,4 @@
-// The filling of a filter's output with the VDI that it has made.
+// Fills a filter's output with the VDI that the filter has made.
 #ifndef VDIOutput_h
 #define VDIOutput_h
 

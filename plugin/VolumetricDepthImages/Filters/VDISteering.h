@@ -22,7 +22,7 @@ class Steering {
   bool IsDue();
   /// Call it after a step's VDI has been published. It takes the viewers' wishes and applies them on all
   /// ranks; they are in force from the next step on. While viewers pause the simulation, it waits here, and
-  /// makes the step's VDI anew when a viewer changes it. Collective over the clients. Throws vdi::Error:
+  /// makes the step's VDI again when a viewer changes it. Collective over the clients. Throws vdi::Error:
   /// RemoteRank if another rank doesn't take part, InvalidArgument if server and client are different
   /// processes, Io for the log.
   void Meet(vtkSMSourceProxy* writer, vtkSMExtractsController* extractor);

@@ -72,7 +72,7 @@ class ColorCurve : public Curve {
     }
     return knots;
   }
-  /// VTK rounds what it interpolates by CIEDE2000 to 8 bits.
+  /// VTK rounds colours that it interpolates by CIEDE2000 to 8 bits.
   double tolerance() const override {
     return function_->GetColorSpace() == VTK_CTF_LAB_CIEDE2000 ? 0.5 / 255.0 : Curve::tolerance();
   }

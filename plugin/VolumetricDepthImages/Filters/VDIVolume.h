@@ -70,7 +70,7 @@ class Volume {
   bool targets(const Origin& origin) const;
 
   // Main thread.
-  /// Sets what the next turn shows.
+  /// Sets the blocks that the next turn shows.
   void setTarget(const Origin& origin);
   /// Registers a user until it leaves. `wants` tells whether the user would make its next VDI from these
   /// blocks. The volume doesn't keep the user alive.

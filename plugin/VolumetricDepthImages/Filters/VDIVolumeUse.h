@@ -28,7 +28,7 @@ class VolumeUse {
   const std::shared_ptr<Volume>& volume() const { return volume_; }
   /// Uses the volume in which another filter shows this input, or a volume that can show it. Collective.
   void choose(vtkMultiProcessController* controller, const Origin& origin);
-  /// No longer a user, but still keeps the volume alive.
+  /// Ends this use, but keeps the volume alive.
   void leave();
   /// Gives up the volume.
   void giveUp() { this->use(nullptr); }

@@ -87,8 +87,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// The reason why the view gives no viewpoint of this filter's volume, which it must show; empty if it
   /// gives one.
   std::string WhyNotFrom(vtkSMViewProxy* view);
-  /// Sets camera and Resolution to the view's, and traces it. Returns "", or the reason why the view can't be
-  /// used; then it sets nothing.
+  /// Sets camera and Resolution to the view's, and records them in the trace. Returns "". If the view can't
+  /// be used, sets nothing and returns the reason.
   std::string SetViewpoint(vtkSMViewProxy* view);
   /// The angle in degrees, at the middle of the input's shown part, between the view's camera and the camera
   /// that is set.

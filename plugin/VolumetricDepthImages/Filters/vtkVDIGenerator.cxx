@@ -372,7 +372,7 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const pv::Origin& origin)
 }
 
 /// Enters an update on all ranks. If the ranks' filters don't belong together, all give up their volumes and
-/// start anew.
+/// start again.
 void vtkVDIGenerator::Enter() {
   Internals& internal = *this->Internal;
   try {

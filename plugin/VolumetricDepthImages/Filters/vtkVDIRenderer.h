@@ -49,7 +49,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIRenderer : public vtkImageAlgorithm 
   vtkSetVector2Macro(Resolution, int);
 
   /// vdi::Reconstruction: 2 (default) also leans the faces of supersegments, 1 blends neighbouring lists, 0
-  /// shows each as it is.
+  /// takes the list that the ray crosses.
   vtkSetClampMacro(Reconstruction, int, 0, 2);
 
   ///@{

@@ -25,7 +25,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamReader : public vtkImageAlgori
   void PrintSelf(ostream& os, vtkIndent indent) override;
 
   ///@{
-  /// Settings of the connection. After a change, the next update connects anew.
+  /// Settings of the connection. After a change, the next update reconnects.
   void SetURL(const char* url);      // the link without its token
   void SetToken(const char* token);  // "": the token of TokenFile, or else of the environment
   void SetTokenFile(const char* file);

@@ -1,6 +1,6 @@
 // Starts with the plugin. It gives each VolumetricDepthImage of the pipeline a pqVDIRegenerator, has still
-// frames deferred, has views follow each VDIStream, moves the view to the viewpoint of what the user opens,
-// and warns of servers that lack the plugin.
+// frames deferred, has views follow each VDIStream, moves the view to the viewpoint of the VDI that the user
+// opens, and warns of servers that lack the plugin.
 #ifndef pqVDIBehavior_h
 #define pqVDIBehavior_h
 

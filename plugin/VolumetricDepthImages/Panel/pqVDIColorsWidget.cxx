@@ -91,7 +91,7 @@ void pqVDIColorsWidget::mapChanged() {
   delete this->Dialog;
   const bool there = vtkSMPropertyHelper(this->proxy(), "LookupTable").GetAsProxy() != nullptr;
   this->Button->setEnabled(there);
-  this->Button->setToolTip(there ? tr("The VDI is made anew after each edit")
+  this->Button->setToolTip(there ? tr("The VDI is regenerated after each edit")
                                  : tr("The first Apply takes the map by which the view shows the volume"));
 }
 

@@ -33,7 +33,7 @@ pqVDIRegenerateWidget::pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty*, 
   auto* button =
       new QPushButton(QIcon(":/VolumetricDepthImages/vdi.svg"), tr("Regenerate From This View"), this);
   button->setObjectName("Regenerate");
-  button->setToolTip(tr("Makes the VDI anew from the camera of the active view, at its size"));
+  button->setToolTip(tr("Regenerates the VDI from the camera of the active view, at its size"));
   layout->addWidget(button);
   this->connect(button, &QPushButton::clicked, this, &pqVDIRegenerateWidget::regenerate);
   this->Auto->setObjectName("Auto");
@@ -108,5 +108,5 @@ void pqVDIRegenerateWidget::showAuto() {
 
 void pqVDIRegenerateWidget::showProgress(int percent) {
   this->Looking.stop();
-  this->Line->setText(percent >= 0 ? tr("Making the VDI anew: %1 %").arg(percent) : QString());
+  this->Line->setText(percent >= 0 ? tr("Regenerating the VDI: %1 %").arg(percent) : QString());
 }

@@ -1,4 +1,4 @@
-// The property widget `vdi_regenerate`. It has a button that makes the VDI anew from the active view, and a
+// The property widget `vdi_regenerate`. It has a button that regenerates the VDI from the active view, and a
 // line with the progress in percent, or with the reason why the view can't be used. A box sets Auto at once,
 // without Apply, because it changes no data.
 #ifndef pqVDIRegenerateWidget_h

@@ -28,7 +28,7 @@ namespace {
 
 constexpr int lookMilliseconds = 40;
 constexpr int lookAtViewsMilliseconds = 250;
-/// The time that an edit rests before the VDI is made anew.
+/// The time that an edit rests before the VDI is regenerated.
 constexpr int editRestMilliseconds = 400;
 
 std::array<double, 10> numbersOf(vtkCamera* camera) {
@@ -177,7 +177,7 @@ void pqVDIRegenerator::endRender() {
   this->lookWhetherViewsWait();
 }
 
-/// The views that show several values or time steps side by side. Each of these needs a VDI of its own.
+/// Comparative views. Each value or time step in one needs a VDI of its own.
 QList<pqView*> pqVDIRegenerator::comparativeViews() const {
   QList<pqView*> views = this->Source->getViews();
   views.erase(std::remove_if(views.begin(), views.end(),

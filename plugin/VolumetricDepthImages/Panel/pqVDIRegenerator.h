@@ -1,4 +1,4 @@
-// Makes the VDI of one VolumetricDepthImage anew without making the window wait: after an edit of a colour
+// Regenerates the VDI of one VolumetricDepthImage without making the window wait: after an edit of a colour
 // map or opacity function, from a view's camera, and by itself while the filter's Auto is on.
 //
 // While a map is being edited, the filter is held: it shows its last VDI. Once the edit has rested and no
@@ -33,7 +33,7 @@ class pqVDIRegenerator : public QObject {
 
   /// Call it just before the panel applies: the next update is for a view.
   void applies();
-  /// Makes the VDI anew from the camera of the view, at its size. Returns "", or the reason why it can't.
+  /// Regenerates the VDI from the camera of the view, at its size. Returns "", or the reason why it can't.
   QString regenerate(pqView* view);
   /// The regenerator of a proxy; null if the proxy is no VolumetricDepthImage in the pipeline.
   static pqVDIRegenerator* of(vtkSMVDIGeneratorProxy* proxy);

@@ -35,9 +35,9 @@ class VDIBuffers {
   /// and replaces a piece that waits already.
   void load(vtkDataObject* piece);
   /// Shows the newest VDI that has been loaded, starts to load a waiting piece, and returns whether the VDI
-  /// changed. Waits at most `wait` for the newest piece, then goes on showing the last one. Throws vdi::Error
-  /// for a VDI that isn't sound, for a piece with a problem, and for a device that fails; then nothing is
-  /// shown.
+  /// changed. Waits at most `wait` for the newest piece, then continues to show the last one. Throws
+  /// vdi::Error for a VDI that isn't sound, for a piece with a problem, and for a device that fails; then
+  /// nothing is shown.
   bool take(std::chrono::steady_clock::duration wait);
   /// Whether a newer VDI than the one shown is being loaded, and whether `take` would show it at once.
   bool isLoading() const { return job_.valid(); }

@@ -47,7 +47,7 @@ class VDINotices {
   void note(const std::string& text, vtkVDIMessage::Place place = vtkVDIMessage::Place::Middle);
   /// Notes what is wrong with the viewpoint of the prop's VDI or with the view, unless another VDI of the
   /// renderer notes it. Angles and cut edges aren't faults: a VDI with all of its scene looks right from all
-  /// around. `isFiltered`: the user can make the VDI anew.
+  /// around. `isFiltered`: the user can make the VDI again.
   void noteViewpoint(vtkRenderer* renderer, const vdi::View& view, vtkProp* prop, const VDISightOf& sightOf,
                      bool isFiltered);
   /// Notes how far the view is turned from the VDI's viewpoint. The VDI with the largest angle notes it for

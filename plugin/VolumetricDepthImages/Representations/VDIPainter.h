@@ -41,7 +41,7 @@ class VDIPainter {
   void load(vtkOpenGLRenderWindow* window, const glm::ivec2& size, std::span<const glm::u8vec4> picture);
   /// Whether the texture has a picture in that window.
   bool hasPicture(vtkRenderWindow* window) const;
-  /// Blends the texture's picture over what the viewport shows.
+  /// Blends the texture's picture over the viewport's contents.
   void draw(vtkOpenGLRenderWindow* window, double opacity);
   /// Gives each pixel of the background a depth just short of the background's.
   void markDepth(vtkOpenGLRenderWindow* window);

@@ -35,7 +35,7 @@ void packNothing(vtkPolyData* piece);
 void packProblem(const std::string& text, vtkPolyData* piece);
 /// Makes `piece` carry the VDI of `data`, or a problem. `crosses`: the piece leaves the process.
 void packVdi(vtkDataObject* data, bool crosses, vtkPolyData* piece);
-/// Marks a piece whose VDI a filter of the pipeline can make anew.
+/// Marks a piece whose VDI a filter of the pipeline can make again.
 void markFiltered(vtkPolyData* piece);
 bool isFiltered(vtkFieldData* fields);
 /// Gets the world bounds, in VTK's order, from a piece's field data. Returns false if it has no VDI with a

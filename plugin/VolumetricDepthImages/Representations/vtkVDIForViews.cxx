@@ -13,7 +13,7 @@ vtkStandardNewMacro(vtkVDIForViews);
 
 namespace {
 
-/// Brackets each request upstream.
+/// Calls BeginView before, and EndView after, each request that goes upstream.
 class Executive : public vtkCompositeDataPipeline {
  public:
   static Executive* New();

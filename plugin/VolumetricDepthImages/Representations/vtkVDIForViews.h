@@ -20,7 +20,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIForViews : public vtk
   static vtkVDIForViews* New();
   vtkTypeMacro(vtkVDIForViews, vtkPassInputTypeAlgorithm);
 
-  /// The filter upstream of an algorithm that can make the VDI anew; null if there is none.
+  /// The filter upstream of an algorithm that can make the VDI again; null if there is none.
   static vtkVDIGenerator* GeneratorOf(vtkAlgorithm* algorithm);
 
   /// While it exists, updates of that filter are for a view.

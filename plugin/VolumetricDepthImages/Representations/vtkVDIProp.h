@@ -87,7 +87,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   vtkSetMacro(MarksDepth, bool);
 
   /// vdi::Reconstruction: 2 (default) also leans the faces of supersegments, 1 blends neighbouring lists, 0
-  /// shows each list as it is.
+  /// takes the list that the ray crosses.
   vtkSetClampMacro(Reconstruction, int, 0, 2);
   vtkGetMacro(Reconstruction, int);
   /// Adds a plane: the prop shows the side to which its normal points. Reports and ignores a plane without a
