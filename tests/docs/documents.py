@@ -1,6 +1,6 @@
 """Shared by the tests of the snippets of README.md and docs/*.md.
 
-Each snippet in C, Fortran, CMake, Python and JSON needs a test, and each test needs its snippet.
+Each snippet in C, C++, Fortran, CMake, Python and JSON needs a test, and each test needs its snippet.
 Arguments: a part (core, paraview or recipes), the source folder, vdi.
 """
 
@@ -15,7 +15,7 @@ import tempfile
 import time
 
 PART, SOURCE, TOOL = sys.argv[1:4]
-LANGUAGES = ("c", "fortran", "cmake", "python", "json")
+LANGUAGES = ("c", "cpp", "fortran", "cmake", "python", "json")
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.M | re.S)
 Test = collections.namedtuple("Test", "part document start function")
 TESTS = []

@@ -4,7 +4,7 @@ The tests add the surroundings that a document's text describes, such as the sim
 change the snippets only in one port, which another program may hold, in one number of steps, and in the
 number of pixels. Snippets share runs where they can, because ParaView takes seconds to start and to draw.
 
-The environment has MPICC, MPIFORT, PVBATCH, PV_PLUGIN_CONFIG_FILE and PYTHONPATH.
+The environment has MPICC, MPICXX, MPIFORT, LIBRARY (libpv-vdi), PVBATCH, PV_PLUGIN_CONFIG_FILE and PYTHONPATH.
 """
 
 import atexit
@@ -98,15 +98,44 @@ def fortran(text):
     run(os.environ["MPIFORT"], "-fsyntax-only", module, "snippet.f90")
 
 
-@tests("core", "docs/catalyst-guide.md", "find_package(pv-vdi")
-def cmake(text):
+def compile_cpp(text, *options):
+    write("snippet.cpp", text)
+    run(os.environ["MPICXX"], "-std=c++20", "-Wall", "-Wextra", "-Werror", "-DOMPI_SKIP_MPICXX",
+        "-I", SOURCE, "snippet.cpp", *options)
+
+
+@tests("core", "docs/cpp.md", "#include <vdi/io/VdiFile.h>")
+def cpp_program(text):
+    library = os.environ["LIBRARY"]
+    compile_cpp(text, library, "-Wl,-rpath," + os.path.dirname(library), "-o", "snippet")
+    run("./snippet")
+    assert made("*.vdi") == ["ramp.vdi"], made("*.vdi")
+
+
+@tests("core", "docs/cpp.md", "auto ranks = ")
+def cpp_with_mpi(text):
+    compile_cpp("""#include <mpi.h>
+#include <utility>
+#include "vdi/pipeline/VdiGenerator.h"
+void snippet(const std::vector<vdi::Block>& blocks, const vdi::Camera& camera,
+             const vdi::TransferFunction& function, const vdi::GenerateSettings& settings) {
+%s}
+""" % text, "-fsyntax-only")
+
+
+def check_cmake(text):
     """The tests of the installation configure this project."""
     with open(os.path.join(SOURCE, "tests", "install", "project", "CMakeLists.txt")) as file:
         project = file.read()
     for line in text.splitlines():
         command = re.sub(r"\s*#.*", "", line).replace("(simulation ", "(from_c ")
-        command = command.replace("COMPONENTS catalyst)", "COMPONENTS catalyst vdi)")
+        command = re.sub(r"COMPONENTS (catalyst|vdi)\)", "COMPONENTS catalyst vdi)", command)
+        command = command.replace("(viewer PRIVATE pv-vdi::vdi)", "(from_cpp PRIVATE pv-vdi::vdi pv-vdi::catalyst)")
         assert command in project, "the tested project lacks: " + command
+
+
+for document in ("docs/catalyst-guide.md", "docs/cpp.md"):
+    tests("core", document, "find_package(pv-vdi")(check_cmake)
 
 
 def check_run(text):
