@@ -56,10 +56,15 @@ void snippet(%s) {
         "-I", ADAPTOR, "snippet.c")
 
 
-@tests("core", "README.md", "const char* scripts[]")
-def c_with_script(text):
+@tests("core", "README.md", "vdi_catalyst* catalyst;")
+def c_in_short(text):
     compile_c("MPI_Comm comm, size_t block_count, const vdi_catalyst_block* blocks,"
               " const void* const* values, int64_t step, double time", text)
+
+
+@tests("core", "docs/catalyst-guide.md", "const char* scripts[]")
+def c_with_script(text):
+    compile_c("MPI_Comm comm, vdi_catalyst* catalyst", text)
 
 
 @tests("core", "docs/catalyst-guide.md", "vdi_catalyst* vdi;")
@@ -144,7 +149,8 @@ def check_run(text):
     run(TOOL, "check", "run.json")
 
 
-for document, start in (("docs/catalyst-guide.md", '{"field": "V", "every": 10}'),
+for document, start in (("README.md", '{"field": "V", "every": 10}'),
+                        ("docs/catalyst-guide.md", '{"field": "V", "every": 10}'),
                         ("docs/catalyst-guide.md", '{\n  "field": "V",\n  "every": 10'),
                         ("docs/catalyst-guide.md", '{"field": "V", "every_time"'),
                         ("docs/catalyst-guide.md", '{"field": "V", "every": 10, "cameras"'),
@@ -250,7 +256,7 @@ def streamed():
             + "assert (stream.Writer.Port, stream.Writer.Steer) == (0, 1)\n", 11)
 
 
-@tests("paraview", "README.md", 'image = VolumetricDepthImage(Input=TrivialProducer')
+@tests("paraview", "docs/catalyst-guide.md", 'image = VolumetricDepthImage(Input=TrivialProducer')
 def script_in_short(text):
     in_situ("from paraview.simple import *\n" + text + "image.Resolution = " + SMALL + "\n")
     assert made("*.vdi") == ["vdi_000000.vdi"], made("*.vdi")
