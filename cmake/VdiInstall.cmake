@@ -107,6 +107,13 @@ write_basic_package_version_file(pv-vdi-config-version.cmake COMPATIBILITY SameM
 install(FILES "${CMAKE_BINARY_DIR}/pv-vdi-config.cmake" "${CMAKE_BINARY_DIR}/pv-vdi-config-version.cmake"
         DESTINATION "${cmakeDir}")
 
-install(FILES README.md CHANGELOG.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+# The documents, and the files that they link to, in the places that the links name.
+install(FILES README.md CHANGELOG.md CONTRIBUTING.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
 install(FILES LICENSE DESTINATION "${CMAKE_INSTALL_DOCDIR}" RENAME copyright)
 install(DIRECTORY docs DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+install(DIRECTORY python_pipelines DESTINATION "${CMAKE_INSTALL_DOCDIR}" FILES_MATCHING PATTERN "*.py" PATTERN "*.json")
+install(FILES catalyst_adaptor/vdi_catalyst.h catalyst_adaptor/vdi_catalyst.f90
+        DESTINATION "${CMAKE_INSTALL_DOCDIR}/catalyst_adaptor")
+install(DIRECTORY catalyst_adaptor/examples DESTINATION "${CMAKE_INSTALL_DOCDIR}/catalyst_adaptor"
+        PATTERN CMakeLists.txt EXCLUDE)
+install(DIRECTORY tests/install/project DESTINATION "${CMAKE_INSTALL_DOCDIR}/tests/install")
