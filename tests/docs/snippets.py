@@ -153,7 +153,6 @@ for document, start in (("README.md", '{"field": "V", "every": 10}'),
                         ("docs/catalyst-guide.md", '{"field": "V", "every": 10}'),
                         ("docs/catalyst-guide.md", '{\n  "field": "V",\n  "every": 10'),
                         ("docs/catalyst-guide.md", '{"field": "V", "every_time"'),
-                        ("docs/catalyst-guide.md", '{"field": "V", "every": 10, "cameras"'),
                         ("docs/catalyst-guide.md", '{"field": "V", "every": 10, "isolation"'),
                         ("docs/live.md", '{"field": "V", "stream"')):
     tests("core", document, start)(check_run)
