@@ -197,6 +197,12 @@ function connection(decodeMs = 5) {
   return {live, sockets, shown};
 }
 
+/** The socket opens, and a server that has no series answers. `more` replaces fields of its welcome. */
+function greet(/** @type {FakeSocket} */ socket, /** @type {object} */ more = {}) {
+  socket.open();
+  socket.text({...welcome, series: null, ...more});
+}
+
 function sendLevel(/** @type {FakeSocket} */ socket, /** @type {number} */ frame, /** @type {number} */ index, /** @type {number} */ byte) {
   socket.text({...level, frame, level: index, bytes: 4});
   socket.bytes(part(frame, index, 0, new Uint8Array([byte, 0, 0, 0])));
@@ -235,7 +241,17 @@ async function testConnection() {
   const acks = sockets[0].sent.filter((m) => m.type === "ack" && m.frame === 32).map((m) => m.bytes);
   check(acks.join() === [1, 2, 3, 4].map((i) => i << 19).join(), `an acknowledgement each 512 KiB: ${acks}`);
 
-  // The server disappears, comes back as the same one, and then as another.
+  live.close();
+}
+
+/** The server disappears, comes back as the same one, and then as another. */
+async function testLostConnection() {
+  const {live, sockets} = connection();
+  greet(sockets[0]);
+  sendLevel(sockets[0], 31, 1, 9);
+  await settled(live);
+  sockets[0].text({...level, frame: 32, bytes: 3 << 20});
+  for (let at = 0; at < 2 << 20; at += 1 << 18) sockets[0].bytes(part(32, 0, at, new Uint8Array(1 << 18)));
   sockets[0].end(1006);
   check(live.state === "lost" && live.retryAt > 0, "a lost connection");
   await soon(700);
@@ -251,33 +267,36 @@ async function testConnection() {
   check(live.assembler.level === undefined, "what comes after the end begins no level");
   const wait = live.retryAt - performance.now();
   check(wait > 600 && wait <= 1000, `the second attempt waits for longer: ${wait}`);
+  live.close();
+}
 
+async function testRefusals() {
+  const {live, sockets} = connection();
   live.restart("new");
-  sockets[2].open();
-  check(sockets[2].sent[0].token === "new", "another token");
-  sockets[2].text({type: "error", cause: "the token is wrong"});
-  sockets[2].end(4401);
+  sockets[1].open();
+  check(sockets[1].sent[0].token === "new", "another token");
+  sockets[1].text({type: "error", cause: "the token is wrong"});
+  sockets[1].end(4401);
   check(live.state === "refused" && live.cause.includes("token"), "a wrong token");
   await soon(700);
-  check(sockets.length === 3, "a wrong token isn't tried again");
+  check(sockets.length === 2, "a wrong token isn't tried again");
   live.restart();
-  sockets[3].open();
-  sockets[3].text({...welcome, version: 2});
+  sockets[2].open();
+  sockets[2].text({...welcome, version: 2});
   check(live.state === "refused" && live.cause.includes("version 2"), "another version");
   live.restart();
-  sockets[4].text("noise");
+  sockets[3].text("noise");
   check(live.state === "lost", "noise");
   live.close();
   await soon(1500);
-  check(sockets.length === 5 && live.state === "closed", "a closed connection stays closed");
+  check(sockets.length === 4 && live.state === "closed", "a closed connection stays closed");
 }
 
 /** A connection that breaks silently reports nothing. The page notices the silence. */
 async function testSilence() {
   const pulse = 0.1;
   const {live, sockets} = connection();
-  sockets[0].open();
-  sockets[0].text({...welcome, series: null, pulse});
+  greet(sockets[0], {pulse});
   sockets[0].text({type: "state", state: "live", viewers: 1});
   sockets[0].text({...level, frame: 8, bytes: 1 << 20});
   for (let at = 0; at < 15; ++at) {
@@ -293,8 +312,7 @@ async function testSilence() {
   await soon(450);
   check(live.state === "lost" && live.cause === "the server doesn't answer", `a connection that breaks: ${live.state}`);
   await soon(500);
-  sockets[1].open();
-  sockets[1].text({...welcome, series: null});
+  greet(sockets[1]);
   await soon(800);
   check(live.state === "waiting", `a server that promises no pulse may be silent: ${live.state}`);
   live.close();
@@ -303,8 +321,7 @@ async function testSilence() {
 /** The decoder takes a level late, while the next one arrives. Acknowledgements of the next one go on. */
 async function testLateDecoder() {
   const {live, sockets} = connection(50);
-  sockets[0].open();
-  sockets[0].text({...welcome, series: null});
+  greet(sockets[0]);
   const give = (/** @type {number} */ index, /** @type {number} */ from, /** @type {number} */ to) => {
     for (let at = from; at < to; at += 1 << 18) sockets[0].bytes(part(8, index, at, new Uint8Array(1 << 18)));
   };
@@ -344,8 +361,7 @@ async function testLateLevel() {
 async function testSeries() {
   const {live, sockets} = connection();
   live.wanted = 3;
-  sockets[0].open();
-  sockets[0].text(welcome);
+  greet(sockets[0], {series: welcome.series});
   const wishes = () => sockets[0].sent.filter((m) => m.type !== "hello" && m.type !== "ack").map((m) => m.type + (m.index ?? "")).join();
   check(wishes() === "", "a frame that doesn't exist yet isn't asked for");
   sockets[0].text({type: "series", from: 3, times: [1], steps: [3]});
@@ -362,15 +378,13 @@ async function testSeries() {
 /** After a reconnect, a server sends the newest frame before it hears of the chosen one. */
 async function testChosenFrame() {
   const {live, sockets, shown} = connection();
-  sockets[0].open();
-  sockets[0].text(welcome);
+  greet(sockets[0], {series: welcome.series});
   live.show(1);
   sendLevel(sockets[0], 1, 1, 11);
   await settled(live);
   sockets[0].end(1006);
   live.connect();
-  sockets[1].open();
-  sockets[1].text(welcome);
+  greet(sockets[1], {series: welcome.series});
   sendLevel(sockets[1], 2, 1, 21);
   await settled(live);
   check(shown.join() === "11" && live.shown?.frame === 1, `the newest frame isn't shown in place of the chosen one: ${shown}`);
@@ -401,31 +415,38 @@ async function testChosenFrame() {
   live.close();
 }
 
-/** A pause keeps the frame on show, and stops the server once that frame is full or can't become so. */
-async function testPause() {
+/** A connection in pauses, with what the tests of these ask of it. */
+function pausable() {
   const {live, sockets, shown} = connection();
   let socket = sockets[0];
   const begin = (/** @type {object} */ more) => {
     socket = sockets[sockets.length - 1];
-    socket.open();
-    socket.text({...welcome, series: null, ...more});
+    greet(socket, more);
   };
-  const reconnect = (/** @type {object} */ more) => {
-    socket.end(1006);
-    live.connect();
-    begin(more);
-    return socket.sent[0].have;
-  };
-  const give = async (/** @type {number} */ frame, /** @type {number} */ index) => {
-    sendLevel(socket, frame, index, 10 * frame + index);
-    await settled(live);
-  };
-  const asked = () => socket.sent.filter((m) => m.type === "pause" || m.type === "resume").map((m) => m.type).join();
-  const acks = (/** @type {number} */ frame) =>
-    socket.sent.filter((m) => m.type === "ack" && m.frame === frame).length;
-  const seen = () => shown.splice(0).join();
-
   begin({});
+  return {
+    live,
+    socket: () => socket,
+    /** Returns the frame that the page says it has. */
+    reconnect: (/** @type {object} */ more) => {
+      socket.end(1006);
+      live.connect();
+      begin(more);
+      return socket.sent[0].have;
+    },
+    give: async (/** @type {number} */ frame, /** @type {number} */ index) => {
+      sendLevel(socket, frame, index, 10 * frame + index);
+      await settled(live);
+    },
+    asked: () => socket.sent.filter((m) => m.type === "pause" || m.type === "resume").map((m) => m.type).join(),
+    acks: (/** @type {number} */ frame) => socket.sent.filter((m) => m.type === "ack" && m.frame === frame).length,
+    seen: () => shown.splice(0).join(),
+  };
+}
+
+/** A pause keeps the frame on show, and stops the server once that frame is full or can't become so. */
+async function testPause() {
+  const {live, socket, give, asked, acks, seen} = pausable();
   await give(1, 0);
   live.pause();
   check(asked() === "", "a paused coarse frame needs its finer levels");
@@ -441,12 +462,37 @@ async function testPause() {
 
   await give(3, 0);
   live.pause();
-  socket.text({...level, frame: 4, level: 0, bytes: 4});
+  socket().text({...level, frame: 4, level: 0, bytes: 4});
   check(asked() === "pause,resume,pause", `the server has gone on to another frame: ${asked()}`);
-  socket.bytes(part(4, 0, 0, new Uint8Array([40, 0, 0, 0])));
+  socket().bytes(part(4, 0, 0, new Uint8Array([40, 0, 0, 0])));
   await settled(live);
   check(seen() === "30" && acks(4) === 1, "another frame is acknowledged, and kept off in the pause");
 
+  live.follow();
+  await give(5, 0);
+  check(seen() === "40,50", "the level held back, then the next frame");
+  sendLevel(socket(), 7, 0, 70);
+  live.pause();
+  await settled(live);
+  check(seen() === "" && live.shown?.frame === 5, "a pause keeps off the level that the decoder works on");
+  live.show(7);
+  await settled(live);
+  check(seen() === "70" && !live.isPaused, "a frame that was held back is asked for");
+
+  live.pause();
+  sendLevel(socket(), 7, 1, 71);
+  sendLevel(socket(), 8, 0, 80);
+  await soon(30);
+  check(seen() === "71", "the finer level that waits outlives another frame's");
+  live.close();
+}
+
+/** A pause goes on over a new connection. A coarse frame may still become full, and a full one stays. */
+async function testPauseAndReconnect() {
+  const {live, reconnect, give, asked, acks, seen} = pausable();
+  await give(3, 0);
+  live.pause();
+  check(seen() === "30", "a coarse frame in a pause");
   check(reconnect({}) === null && asked() === "", "a coarse frame may become full after a reconnect");
   await give(5, 0);
   check(seen() === "" && acks(5) === 1 && asked() === "pause",
@@ -470,20 +516,6 @@ async function testPause() {
   check(live.shown === undefined, "the former run's frame counts for nothing after the pause");
   await settled(live);
   check(seen() === "51" && live.shown?.frame === 5, "the new run's frame follows");
-
-  sendLevel(socket, 7, 0, 70);
-  live.pause();
-  await settled(live);
-  check(seen() === "" && live.shown?.frame === 5, "a pause keeps off the level that the decoder works on");
-  live.show(7);
-  await settled(live);
-  check(seen() === "70" && !live.isPaused, "a frame that was held back is asked for");
-
-  live.pause();
-  sendLevel(socket, 7, 1, 71);
-  sendLevel(socket, 8, 0, 80);
-  await soon(30);
-  check(seen() === "71", "the finer level that waits outlives another frame's");
   live.close();
 }
 
@@ -521,8 +553,7 @@ function panelOf() {
 /** The line and the light of a run that is live, ends as it should, and is followed by another. */
 async function testEndedRun() {
   const {panel, live, sockets} = panelOf();
-  sockets[0].open();
-  sockets[0].text({...welcome, series: null});
+  greet(sockets[0]);
   sockets[0].text({type: "state", state: "live", viewers: 1});
   sendLevel(sockets[0], 4, 0, 7);
   await settled(live);
@@ -536,8 +567,7 @@ async function testEndedRun() {
   check(panel.label() === "Connect", "the button looks for another run at once");
   await soon(700);
   check(sockets.length === 2 && light() === "ended", `the page looks for another run: ${sockets.length}, ${light()}`);
-  sockets[1].open();
-  sockets[1].text({...welcome, series: null, session: "other"});
+  greet(sockets[1], {session: "other"});
   check(liveText(live, 0).startsWith("Waiting"), `another run is there: ${liveText(live, 0)}`);
   sockets[1].end(1006);
   check(liveText(live, 0).startsWith("Not connected") && light() === "lost", `a run that is cut off: ${liveText(live, 0)}, ${light()}`);
@@ -545,8 +575,7 @@ async function testEndedRun() {
 
   // A finished series whose server goes can't be played any more.
   const series = panelOf();
-  series.sockets[0].open();
-  series.sockets[0].text(welcome);
+  greet(series.sockets[0], {series: welcome.series});
   series.sockets[0].text({type: "state", state: "ended", viewers: 1});
   series.sockets[0].end(1001);
   check(series.live.state === "lost" && !series.live.hasEnded, "a series whose server is gone isn't connected");
@@ -556,8 +585,7 @@ async function testEndedRun() {
 /** A relay whose source is gone. */
 async function testLostSource() {
   const {live, sockets} = panelOf();
-  sockets[0].open();
-  sockets[0].text({...welcome, series: null});
+  greet(sockets[0]);
   sockets[0].text({type: "state", state: "live", viewers: 1});
   sendLevel(sockets[0], 4, 0, 7);
   await settled(live);
@@ -576,8 +604,7 @@ async function testLostSource() {
 /** A request for a frame of a series ends, whatever happens to the frame. */
 async function testMissingFrames() {
   const {panel, live, sockets} = panelOf();
-  sockets[0].open();
-  sockets[0].text(welcome);
+  greet(sockets[0], {series: welcome.series});
   sockets[0].text({type: "state", state: "ended", viewers: 1});
   const ending = (/** @type {Promise<any>} */ shown) => Promise.race([shown, soon(300).then(() => "waits")]);
 
@@ -624,8 +651,7 @@ async function testManyFrames() {
     return heapUsed + arrayBuffers;
   };
   const {live, sockets, shown} = connection();
-  sockets[0].open();
-  sockets[0].text({...welcome, series: null});
+  greet(sockets[0]);
   const end = performance.now() + 1000 * Number(process.env.VDI_FUZZ_SECONDS ?? 0);
   let before = 0, frame = 0;
   for (; frame < 2000 || performance.now() < end; ++frame) {
@@ -646,12 +672,15 @@ testTexts();
 testParts();
 await testManyFrames();
 await testConnection();
+await testLostConnection();
+await testRefusals();
 await testSilence();
 await testLateDecoder();
 await testLateLevel();
 await testSeries();
 await testChosenFrame();
 await testPause();
+await testPauseAndReconnect();
 await testEndedRun();
 await testLostSource();
 await testMissingFrames();
