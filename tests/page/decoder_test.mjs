@@ -8,21 +8,13 @@ import {join} from "node:path";
 import {FormatError, decodeVdi} from "../../web/format.js";
 import {lz4AnnouncedBytes, lz4Expand} from "../../web/lz4.js";
 import {xxh64} from "../../web/xxh64.js";
+import {check, finish, randomFrom} from "./check.mjs";
 
 const vdi = process.argv[2];
 const folder = mkdtempSync(join(tmpdir(), "vdi-decoder-"));
-let failures = 0;
-const fail = (/** @type {string} */ what) => {
-  console.log(`FAILED  ${what}`);
-  ++failures;
-};
+const fail = (/** @type {string} */ what) => check(false, what);
 
-/** Numbers that are the same in each run with the same VDI_FUZZ_SEED. */
-let state = 12344 + Number(process.env.VDI_FUZZ_SEED ?? 1);
-const random = (/** @type {number} */ below) => {
-  state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
-  return Math.floor(state / 0x100000000 * below);
-};
+const random = randomFrom(12344);
 
 function testChecksum() {
   // As xxhsum -H1 prints them.
@@ -195,5 +187,4 @@ testChecksum();
 testLz4();
 await fuzz(files);
 rmSync(folder, {recursive: true});
-console.log(failures === 0 ? "all well" : `${failures} failures`);
-process.exit(failures === 0 ? 0 : 1);
+finish();

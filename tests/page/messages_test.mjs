@@ -7,20 +7,9 @@ import {runInNewContext} from "node:vm";
 import {Live, rateOf} from "../../web/live.js";
 import {LivePanel, liveText} from "../../web/livepanel.js";
 import {LevelAssembler, StreamError, extendedSeries, serverMessageOf} from "../../web/messages.js";
+import {check, finish, randomFrom} from "./check.mjs";
 
-let failures = 0;
-const check = (/** @type {boolean} */ holds, /** @type {string} */ what) => {
-  if (holds) return;
-  console.log(`FAILED  ${what}`);
-  ++failures;
-};
-
-/** Numbers that are the same in each run with the same VDI_FUZZ_SEED. */
-let state = 2023 + Number(process.env.VDI_FUZZ_SEED ?? 1);
-const random = (/** @type {number} */ below) => {
-  state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
-  return Math.floor(state / 0x100000000 * below);
-};
+const random = randomFrom(2023);
 
 /** @returns {any} a function's result, or "refused" for a StreamError of one line */
 function outcome(/** @type {() => any} */ act) {
@@ -685,5 +674,4 @@ await testEndedRun();
 await testLostSource();
 await testMissingFrames();
 check(Math.abs(rateOf(10000, [{at: 8000, bytes: 1000}, {at: 9000, bytes: 3000}, {at: 1000, bytes: 1e9}]) - 2000) < 1, "the rate");
-console.log(failures === 0 ? "all well" : `${failures} failures`);
-process.exit(failures === 0 ? 0 : 1);
+finish();

@@ -6,16 +6,10 @@ import {numberText} from "../../web/legend.js";
 import {outlineEnds} from "../../web/renderer.js";
 import {SteerPanel, steppedValue} from "../../web/steerpanel.js";
 import {Viewer} from "../../web/viewer.js";
+import {check, finish} from "./check.mjs";
 
 Object.assign(globalThis, {postMessage: () => {}});  // the page's script is that of its worker, too
 const {Page} = await import("../../web/page.js");
-
-let failures = 0;
-const check = (/** @type {boolean} */ holds, /** @type {string} */ what) => {
-  if (holds) return;
-  console.log(`FAILED  ${what}`);
-  ++failures;
-};
 
 /** A clock that only `pass` moves. */
 const clock = {
@@ -539,5 +533,4 @@ testRangeUpwards();
 testSamplingRate();
 await testFollowing();
 await testWrongFile();
-console.log(failures === 0 ? "all well" : `${failures} failures`);
-process.exit(failures === 0 ? 0 : 1);
+finish();
