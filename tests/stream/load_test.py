@@ -44,9 +44,14 @@ def stranger(server):
     assert server.get("/status")[0].status == 401
 
 
-def visitor(server):
+def viewer_of(server):
     viewer = Viewer(server.port, PATIENCE)
     viewer.hello(server.token)
+    return viewer
+
+
+def visitor(server):
+    viewer = viewer_of(server)
     next(viewer.levels())
     viewer.close()
 
@@ -65,17 +70,10 @@ def abrupt(server):
 
 def vanishing(server):
     """A viewer that closes when a level has begun."""
-    viewer = Viewer(server.port, PATIENCE)
-    viewer.hello(server.token)
+    viewer = viewer_of(server)
     viewer.text_message("level")
     viewer.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     viewer.close()
-
-
-def viewer_of(server):
-    viewer = Viewer(server.port, PATIENCE)
-    viewer.hello(server.token)
-    return viewer
 
 
 def one_after_another(server):
@@ -100,8 +98,7 @@ def at_once(server):
     codes, frames = [], []
 
     def look():
-        viewer = Viewer(server.port, PATIENCE)
-        viewer.hello(server.token)
+        viewer = viewer_of(server)
         try:
             frames.append(next(viewer.levels())[1])
             start.wait(PATIENCE)
@@ -124,8 +121,7 @@ def at_once(server):
 def slowly(server):
     """More connections than the server takes, each of which sends a byte now and then."""
     before = standing(server)
-    seen = Viewer(server.port, PATIENCE)
-    seen.hello(server.token)
+    seen = viewer_of(server)
     seen.text_message("level")
     slow = [connect(server) for _ in range(400)]
     selector = selectors.DefaultSelector()

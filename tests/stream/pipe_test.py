@@ -10,8 +10,8 @@ import subprocess
 import time
 import unittest
 
-from tool import PATIENCE, VDI, ServedFolder, make, receive, until
-from viewer import OneViewer, Viewer
+from tool import PATIENCE, VDI, ServedFolder, make, receive, run, until
+from viewer import OneViewer
 
 
 def vdi(*arguments):
@@ -50,12 +50,6 @@ class PipeTest(ServedFolder):
             make(cls.made / f"small{step}.vdi", "24x24x24", "48x32", 6, step)
         make(cls.made / "large.vdi", "24x24x24", "320x240", 8, 9)
 
-    def view(self, server):
-        viewer = Viewer(server.port, PATIENCE)
-        self.addCleanup(viewer.close)
-        viewer.hello(server.token)
-        return viewer
-
     def test_receive_takes_all_frames_of_a_series(self):
         names = ["small0", "large", "small2"]
         # Lines that a login shell may say first are skipped.
@@ -83,7 +77,7 @@ class PipeTest(ServedFolder):
         self.appear("small0", "a.vdi")
         server = self.serve("--from", vdi("serve", "--stdio", self.live))
         self.assertIn(b"<title>", server.get("/")[1])
-        viewer = self.view(server)
+        viewer = self.greeted(server)
         levels = viewer.levels()
         announced, data = next(levels)
         self.assertEqual((announced["frame"], announced["step"], data), (0, 0, self.bytes_of("small0")))
@@ -92,7 +86,7 @@ class PipeTest(ServedFolder):
         self.assertEqual([(a["frame"], a["level"], a["levels"], a["step"]) for a, _ in received], [(1, 0, 2, 9), (1, 1, 2, 9)])
         self.assertEqual(received[1][1], self.bytes_of("large"))
         # A viewer that comes later has the series, and goes back in it.
-        other = self.view(server)
+        other = self.greeted(server)
         welcome = other.text_message("welcome")
         self.assertEqual(welcome["series"], {"times": [0, 4.5], "steps": [0, 9]})
         other.send(type="show", index=0)
@@ -132,7 +126,7 @@ class PipeTest(ServedFolder):
             shutil.copy(self.made / f"small{number % 3}.vdi", self.live / f"{number:03}.vdi")
         server = self.serve("--from", vdi("serve", "--stdio", "--finished", self.live))
         until(lambda: json.loads(server.get("/status", Authorization="Bearer " + server.token)[1])["frames"] > 0, "a frame")
-        viewers = [self.view(server) for _ in range(count)]
+        viewers = [self.greeted(server) for _ in range(count)]
         for _ in range(2):
             for index, viewer in enumerate(viewers):
                 viewer.send(type="show", index=index)
@@ -149,7 +143,7 @@ class PipeTest(ServedFolder):
     def test_a_command_that_is_killed_is_run_again(self):
         self.appear("small0", "a.vdi")
         server = self.serve("--from", vdi("serve", "--stdio", self.live))
-        viewer = self.view(server)
+        viewer = self.greeted(server)
         session = viewer.text_message("welcome")["session"]
         self.assertEqual(next(viewer.levels())[1], self.bytes_of("small0"))
         killed = serving_at_a_pipe(self.live)
@@ -159,7 +153,7 @@ class PipeTest(ServedFolder):
         end = time.monotonic() + PATIENCE
         while again is None and time.monotonic() < end:
             try:
-                again = self.view(server)
+                again = self.greeted(server)
             except OSError:
                 time.sleep(0.1)
         self.assertNotEqual(again.text_message("welcome")["session"], session)
@@ -171,7 +165,7 @@ class PipeTest(ServedFolder):
         first = self.serve("--token-file", self.token(), self.live)
         second = self.serve("--from", first.address, "--from-token-file", self.token())
         third = self.serve("--from", second.link)
-        viewer = self.view(third)
+        viewer = self.greeted(third)
         self.appear("large", "a.vdi")
         levels = [data for _, data in (next(viewer.levels()) for _ in range(2))]
         self.assertEqual(levels[1], self.bytes_of("large"))
@@ -181,7 +175,7 @@ class PipeTest(ServedFolder):
         self.appear("small0", "a.vdi")
         first = self.serve("--token-file", self.token(), self.live)
         relay = self.serve("--from", first.address, "--from-token-file", self.token())
-        viewer = self.view(relay)
+        viewer = self.greeted(relay)
         self.assertEqual(next(viewer.levels())[1], self.bytes_of("small0"))
         first.kill()
         while "cause" not in (state := viewer.text_message("state")):
@@ -193,7 +187,7 @@ class PipeTest(ServedFolder):
         self.appear("small0", "a.vdi")
         first = self.serve("--token-file", self.token(), self.live)
         relay = self.serve("--from", first.address, "--from-token-file", self.token())
-        viewer = self.view(relay)
+        viewer = self.greeted(relay)
         levels = viewer.levels()
         self.assertEqual(next(levels)[1], self.bytes_of("small0"))
         for index in range(1, 6):
@@ -218,7 +212,7 @@ class PipeTest(ServedFolder):
             source = OneViewer(listener, PATIENCE)
             source.welcome("first", [0, 1])
             source.send(type="state", state="live", viewers=1)
-            viewer = self.view(relay)
+            viewer = self.greeted(relay)
             known = 0
             while known < 2:
                 message = viewer.message()
@@ -234,7 +228,7 @@ class PipeTest(ServedFolder):
     def test_receive_gives_up_a_series_whose_source_does_not_answer(self):
         first = self.serve("--token-file", self.token(), *(self.made / f"small{index}.vdi" for index in range(3)))
         relay = self.serve("--from", first.address, "--from-token-file", self.token())
-        viewer = self.view(relay)
+        viewer = self.greeted(relay)
         next(viewer.levels())
         first.kill()
         while "cause" not in viewer.text_message("state"):
@@ -255,14 +249,12 @@ class PipeTest(ServedFolder):
             done = receive("--from", command, "--patience", "1")
             self.assertEqual(done.returncode, 1, command)
             self.assertIn(what, done.stderr)
-        done = subprocess.run([VDI, "serve", "--from", "exec /nowhere/vdi"], capture_output=True, text=True, timeout=PATIENCE,
-                              check=False)
+        done = run("serve", "--from", "exec /nowhere/vdi")
         self.assertEqual(done.returncode, 1)
         self.assertIn("status 127", done.stderr)
         for wrong in ([], ["--from", "true", self.live], ["--stdio"], ["--stdio", "--from", "true"],
                       ["--stdio", "--port", "8080", self.live], ["--from-token-file", "file", self.live]):
-            done = subprocess.run([VDI, "serve", *map(str, wrong)], capture_output=True, text=True, timeout=PATIENCE,
-                                  check=False)
+            done = run("serve", *wrong)
             self.assertEqual(done.returncode, 2, wrong)
             self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
         self.assertEqual(receive().returncode, 2)

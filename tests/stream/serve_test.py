@@ -10,8 +10,8 @@ import threading
 import time
 import unittest
 
-from tool import PATIENCE, VDI, ServedFolder, make, receive, until
-from viewer import Closed, OneViewer, Refused, Viewer
+from tool import PATIENCE, VDI, ServedFolder, make, receive, run, until
+from viewer import Closed, OneViewer, Refused
 
 
 class ServeTest(ServedFolder):
@@ -22,11 +22,6 @@ class ServeTest(ServedFolder):
             make(cls.made / f"{name}.vdi", size, "48x32", 6, step)
         # Beyond a MiB in memory: two levels.
         make(cls.made / "large.vdi", "24x24x24", "320x240", 8)
-
-    def view(self, server, **more):
-        viewer = Viewer(server.port, PATIENCE, **more)
-        self.addCleanup(viewer.close)
-        return viewer
 
     def test_files_arrive_as_they_are(self):
         server = self.serve(self.made / "small0.vdi", self.made / "large.vdi", self.made / "small1.vdi")
@@ -40,8 +35,7 @@ class ServeTest(ServedFolder):
 
     def test_a_folder_is_followed(self):
         server = self.serve(self.live)
-        viewer = self.view(server)
-        viewer.hello(server.token)
+        viewer = self.greeted(server)
         self.assertEqual(viewer.text_message("state")["state"], "waiting")
         levels = viewer.levels()
         (self.live / "a.vdi").write_bytes(self.bytes_of("small0")[:5000])
@@ -69,8 +63,7 @@ class ServeTest(ServedFolder):
         self.appear("small1", "step10.vdi")
         server = self.serve(self.live)
         until(lambda: server.get("/status", Authorization="Bearer " + server.token)[1].find(b'"live"') > 0, "a frame")
-        viewer = self.view(server)
-        viewer.hello(server.token)
+        viewer = self.greeted(server)
         welcome = viewer.text_message("welcome")
         self.assertEqual(welcome["series"], {"times": [1.5, 2.0], "steps": [3, 4]})
         levels = viewer.levels()
@@ -96,8 +89,7 @@ class ServeTest(ServedFolder):
         for number in range(6000):
             os.link(self.made / "small0.vdi", self.live / f"{number:06}.vdi")
         server = self.serve(self.live)
-        viewer = self.view(server)
-        viewer.hello(server.token)
+        viewer = self.greeted(server)
         levels = viewer.levels()
         self.assertEqual(next(levels)[0]["frame"], 5999)
         idle = 4
@@ -114,8 +106,7 @@ class ServeTest(ServedFolder):
 
     def test_links_to_files_of_the_folder_are_no_frames(self):
         server = self.serve(self.live)
-        viewer = self.view(server)
-        viewer.hello(server.token)
+        viewer = self.greeted(server)
         levels = viewer.levels()
         (self.folder / "way").symlink_to(self.live)
         self.appear("small0", "a.vdi")
@@ -126,21 +117,18 @@ class ServeTest(ServedFolder):
         (self.live / "z.vdi").symlink_to(self.folder / "elsewhere.vdi")
         while next(levels)[1] != self.bytes_of("large"):
             pass
-        other = self.view(server)
-        other.hello(server.token)
+        other = self.greeted(server)
         self.assertEqual(other.text_message("welcome")["series"]["steps"], [3, 0])
         self.assertEqual(server.end(), 0)
 
     def test_replaced_files_are_new_frames(self):
         self.appear("small0", "a.vdi")
         server = self.serve(self.live)
-        viewer = self.view(server)
-        viewer.hello(server.token)
+        viewer = self.greeted(server)
         levels = viewer.levels()
         self.assertEqual(next(levels)[1], self.bytes_of("small0"))
         # Another viewer has the server keep the frame.
-        other = self.view(server)
-        other.hello(server.token)
+        other = self.greeted(server)
         other.send(type="show", index=0)
         self.assertEqual(next(other.levels())[1], self.bytes_of("small0"))
         # A file that was only touched, or written again as it was, is no new frame.
@@ -196,8 +184,7 @@ class ServeTest(ServedFolder):
             self.assertEqual(given.said().count("\n"), lines, given.said())
             self.assertEqual(given.said().count(f"vdi: warning: other users can read the token in {file}"), lines)
         file.write_text("short\n")
-        done = subprocess.run([VDI, "serve", self.live, "--token-file", file], capture_output=True, text=True,
-                              timeout=PATIENCE, check=False)
+        done = run("serve", self.live, "--token-file", file)
         self.assertEqual(done.returncode, 2)
         self.assertNotIn("short\n", done.stderr)
 
@@ -244,9 +231,8 @@ class ServeTest(ServedFolder):
 
     def test_a_full_disk(self):
         server = self.serve(self.made / "large.vdi")
-        done = subprocess.run([VDI, "receive", server.link, "-o", self.folder / "got"], capture_output=True, text=True,
-                              timeout=PATIENCE, check=False, restore_signals=False,  # SIGXFSZ stays ignored
-                              preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)))
+        done = receive(server.link, "-o", self.folder / "got", restore_signals=False,  # SIGXFSZ stays ignored
+                       preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)))
         self.assertEqual(done.returncode, 1, done.stderr)
         self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
         self.assertEqual(list((self.folder / "got").iterdir()), [])
@@ -271,8 +257,7 @@ class ServeTest(ServedFolder):
                                                  "HTTPS://a.example", "https://A.example", "https://a.example:443",
                                                  "http://a.example:80", "http://a.example:", "http://:8080", "*", "")]
         for arguments in [*wrong, ["--viewers", "0"]]:
-            done = subprocess.run([VDI, "serve", self.live, *arguments], capture_output=True, text=True, timeout=PATIENCE,
-                                  check=False)
+            done = run("serve", self.live, *arguments)
             self.assertEqual(done.returncode, 2, arguments)
             self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
             if arguments in wrong:
@@ -306,8 +291,7 @@ class ServeTest(ServedFolder):
         late = self.view(server)  # says nothing
         self.assertEqual(late.end(), 4408)
         # Acknowledgements of what wasn't sent, and the same one again, do no harm.
-        viewer = self.view(server)
-        viewer.hello(server.token)
+        viewer = self.greeted(server)
         for _ in range(100):
             viewer.send(type="ack", frame=77, level=3, bytes=1 << 40)
         self.assertEqual(next(viewer.levels())[1], self.bytes_of("small0"))
@@ -315,15 +299,12 @@ class ServeTest(ServedFolder):
 
     def test_a_stalled_viewer_holds_up_nobody(self):
         server = self.serve(self.live)
-        stalled = self.view(server)
-        stalled.hello(server.token)
-        gone = self.view(server)
-        gone.hello(server.token)
+        stalled = self.greeted(server)
+        gone = self.greeted(server)
         last, seen = {}, {}
 
         def look(number):
-            viewer = self.view(server)
-            viewer.hello(server.token)
+            viewer = self.greeted(server)
             for announced, data in viewer.levels():
                 last[number] = (announced["step"], data)
                 seen[number] = announced["frame"]
@@ -434,22 +415,19 @@ class ServeTest(ServedFolder):
 
     def test_a_viewer_that_comes_back_gets_what_it_lacks(self):
         server = self.serve(self.made / "large.vdi")
-        viewer = self.view(server)
-        viewer.hello(server.token)
+        viewer = self.greeted(server)
         session = viewer.text_message("welcome")["session"]
         levels = viewer.levels()
         self.assertEqual([next(levels)[0]["level"] for _ in range(2)], [0, 1])
         viewer.close()
-        back = self.view(server)
-        back.hello(server.token, have=0, session=session)
+        back = self.greeted(server, have=0, session=session)
         back.text_message("state")
         back.send(type="show", index=5)
         with self.assertRaises(Closed):  # nothing came before the end
             while True:
                 message = back.message()
                 self.assertNotEqual(message["type"], "level")
-        other = self.view(server)
-        other.hello(server.token, have=0, session="another server's")
+        other = self.greeted(server, have=0, session="another server's")
         self.assertEqual(other.text_message("level")["frame"], 0)
 
     def test_connections_are_bounded(self):
@@ -481,14 +459,12 @@ class ServeTest(ServedFolder):
 
     def test_the_port_is_taken(self):
         server = self.serve(self.made / "small0.vdi")
-        done = subprocess.run([VDI, "serve", self.live, "--port", str(server.port)], capture_output=True, text=True,
-                              timeout=PATIENCE, check=False)
+        done = run("serve", self.live, "--port", server.port)
         self.assertEqual(done.returncode, 1)
         self.assertIn("can't listen", done.stderr)
         for wrong in ([self.folder / "nothing"], [self.live, "--certificate", "nothing.pem"],
                       [self.made / "small0.vdi", self.folder / "nothing.vdi"], [self.live, "--rate", "fast"]):
-            done = subprocess.run([VDI, "serve", *map(str, wrong)], capture_output=True, text=True, timeout=PATIENCE,
-                                  check=False)
+            done = run("serve", *wrong)
             self.assertIn(done.returncode, (1, 2), wrong)
             self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
 

@@ -12,6 +12,8 @@ import tempfile
 import time
 import unittest
 
+from viewer import Viewer
+
 VDI = sys.argv.pop(1)
 PATIENCE = 120  # seconds: far more than anything here takes on a loaded machine
 
@@ -79,9 +81,14 @@ def make(path, size, resolution, supersegments, step=0):
                    stdout=subprocess.DEVNULL)
 
 
-def receive(*arguments, environment=None):
-    return subprocess.run([VDI, "receive", *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE,
-                          env={**os.environ, **(environment or {})}, check=False)
+def run(*arguments, environment=None, **more):
+    """A vdi that ends by itself."""
+    return subprocess.run([VDI, *map(str, arguments)], capture_output=True, text=True, timeout=PATIENCE,
+                          env={**os.environ, **(environment or {})}, check=False, **more)
+
+
+def receive(*arguments, **more):
+    return run("receive", *arguments, **more)
 
 
 def until(condition, what):
@@ -113,6 +120,17 @@ class ServedFolder(unittest.TestCase):
         server = Server(*arguments, **more)
         self.addCleanup(server.close)
         return server
+
+    def view(self, server, **more):
+        viewer = Viewer(server.port, PATIENCE, **more)
+        self.addCleanup(viewer.close)
+        return viewer
+
+    def greeted(self, server, **more):
+        """A viewer that has said hello, with the token and `more`."""
+        viewer = self.view(server)
+        viewer.hello(server.token, **more)
+        return viewer
 
     def appear(self, made, name):
         """Makes a file appear whole at once, as a simulation's does."""
