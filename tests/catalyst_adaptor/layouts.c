@@ -102,24 +102,77 @@ static int32_t source_of(int32_t index, int n, int is_periodic) {
   return index < 0 ? -index : 2 * (n - 1) - index;
 }
 
+static int set_array(vdi_catalyst* catalyst, const array* a, int rank) {
+  const void* data[] = {a->is_partial && rank % 2 == 1 ? NULL : a->first};
+  const int cells = VDI_CATALYST_CELLS;
+  return (vdi_catalyst_set_array_offset(catalyst, a->name, cells, a->offset) != VDI_CATALYST_OK) +
+         (vdi_catalyst_set_array_strided(catalyst, a->name, a->type, cells, a->components, data,
+                                         &a->strides) != VDI_CATALYST_OK);
+}
+
+static int is_taken(vdi_catalyst* catalyst, const char* name, int association, const double* offset) {
+  return vdi_catalyst_set_array_offset(catalyst, name, association, offset) != VDI_CATALYST_BAD_ARGUMENT;
+}
+
+static int bad_offsets(vdi_catalyst* catalyst) {
+  const double zero[] = {0.0, 0.0, 0.0};
+  const double far[] = {0.0, 0.6, 0.0};
+  const double none[] = {0.0, NAN, 0.0};
+  return is_taken(catalyst, "V", VDI_CATALYST_CELLS, far) +
+         is_taken(catalyst, "V", VDI_CATALYST_CELLS, none) + is_taken(catalyst, "V", 7, zero) +
+         is_taken(catalyst, "", VDI_CATALYST_CELLS, none) + is_taken(catalyst, "V", VDI_CATALYST_CELLS, NULL);
+}
+
+/* This rank's part of a domain of n cells along each axis, with the ghost layer around it. */
+typedef struct {
+  int n;
+  int32_t first[3];
+  int32_t cells[3];
+  int ghosts;
+  int is_periodic;
+} part;
+
+static part part_of(int rank, int ranks, int n, const char* layout) {
+  part own = {n, {0}, {0}, strncmp(layout, "star_", 5) == 0, strncmp(layout, "star_periodic", 13) == 0};
+  int split[3] = {0, 0, 0};
+  MPI_Dims_create(ranks, 3, split);
+  const int32_t at_rank[3] = {rank % split[0], rank / split[0] % split[1], rank / split[0] / split[1]};
+  for (int axis = 0; axis < 3; ++axis) {
+    const int32_t begin = at_rank[axis] * n / split[axis];
+    own.first[axis] = begin - own.ghosts;
+    own.cells[axis] = (at_rank[axis] + 1) * n / split[axis] - begin + 2 * own.ghosts;
+  }
+  return own;
+}
+
+/* The field's value in a cell, unless the cell lies at an edge or a corner of the ghost layer. */
+static void simulate_cell(const part* own, const array* a, const int32_t* at, double t) {
+  double place[3];
+  int outside = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    outside += at[axis] < own->ghosts || at[axis] >= own->cells[axis] - own->ghosts;
+    const int32_t source = source_of(own->first[axis] + at[axis], own->n, own->is_periodic);
+    place[axis] = (source + 0.5 + a->offset[axis]) * (1.0 / own->n);
+  }
+  if (outside <= 1) store(a, at, field(place[0], place[1], place[2], t));
+}
+
+static void simulate(const part* own, const array* a, double t) {
+  int32_t at[3];
+  for (at[2] = 0; at[2] < own->cells[2]; ++at[2]) {
+    for (at[1] = 0; at[1] < own->cells[1]; ++at[1]) {
+      for (at[0] = 0; at[0] < own->cells[0]; ++at[0]) simulate_cell(own, a, at, t);
+    }
+  }
+}
+
 int main(int argc, char** argv) {
   int rank = 0;
   int ranks = 0;
   begin(&argc, &argv, &rank, &ranks);
   if (argc != 5) MPI_Abort(MPI_COMM_WORLD, 2);
-  const int n = atoi(argv[2]);
-  int split[3] = {0, 0, 0};
-  MPI_Dims_create(ranks, 3, split);
-  const int32_t at_rank[3] = {rank % split[0], rank / split[0] % split[1], rank / split[0] / split[1]};
-  const int ghosts = strncmp(argv[3], "star_", 5) == 0;
-  const int is_periodic = strncmp(argv[3], "star_periodic", 13) == 0;
-  int32_t first[3];
-  int32_t cells[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    const int32_t begin = at_rank[axis] * n / split[axis];
-    first[axis] = begin - ghosts;
-    cells[axis] = (at_rank[axis] + 1) * n / split[axis] - begin + 2 * ghosts;
-  }
+  const part own = part_of(rank, ranks, atoi(argv[2]), argv[3]);
+  const int32_t* cells = own.cells;
 
   array arrays[MOST];
   int count = 0;
@@ -138,50 +191,19 @@ int main(int argc, char** argv) {
 
   vdi_catalyst* catalyst = NULL;
   int wrong = initialize_any(argv[1], &catalyst) != VDI_CATALYST_OK;
-  const double h = 1.0 / n;
+  const double h = 1.0 / own.n;
+  const int ghosts = own.ghosts;
   const vdi_catalyst_block block = {{cells[0], cells[1], cells[2]},
                                     {ghosts, ghosts, ghosts},
                                     {ghosts, ghosts, ghosts},
-                                    {first[0] * h, first[1] * h, first[2] * h},
+                                    {own.first[0] * h, own.first[1] * h, own.first[2] * h},
                                     {h, h, h}};
   wrong += vdi_catalyst_set_blocks(catalyst, 1, &block) != VDI_CATALYST_OK;
-  for (int i = 0; i < count; ++i) {
-    const void* data[] = {arrays[i].is_partial && rank % 2 == 1 ? NULL : arrays[i].first};
-    wrong += vdi_catalyst_set_array_offset(catalyst, arrays[i].name, VDI_CATALYST_CELLS, arrays[i].offset) !=
-             VDI_CATALYST_OK;
-    wrong +=
-        vdi_catalyst_set_array_strided(catalyst, arrays[i].name, arrays[i].type, VDI_CATALYST_CELLS,
-                                       arrays[i].components, data, &arrays[i].strides) != VDI_CATALYST_OK;
-  }
-  const double far[] = {0.0, 0.6, 0.0};
-  const double none[] = {0.0, NAN, 0.0};
-  wrong += vdi_catalyst_set_array_offset(catalyst, "V", VDI_CATALYST_CELLS, far) != VDI_CATALYST_BAD_ARGUMENT;
-  wrong +=
-      vdi_catalyst_set_array_offset(catalyst, "V", VDI_CATALYST_CELLS, none) != VDI_CATALYST_BAD_ARGUMENT;
-  wrong += vdi_catalyst_set_array_offset(catalyst, "V", 7, arrays[0].offset) != VDI_CATALYST_BAD_ARGUMENT;
-  wrong += vdi_catalyst_set_array_offset(catalyst, "", VDI_CATALYST_CELLS, none) != VDI_CATALYST_BAD_ARGUMENT;
-  wrong +=
-      vdi_catalyst_set_array_offset(catalyst, "V", VDI_CATALYST_CELLS, NULL) != VDI_CATALYST_BAD_ARGUMENT;
+  for (int i = 0; i < count; ++i) wrong += set_array(catalyst, &arrays[i], rank);
+  wrong += bad_offsets(catalyst);
 
   for (int step = 0; step < atoi(argv[4]); ++step) {
-    for (int i = 0; i < count; ++i) {
-      for (int32_t z = 0; z < cells[2]; ++z) {
-        for (int32_t y = 0; y < cells[1]; ++y) {
-          for (int32_t x = 0; x < cells[0]; ++x) {
-            const int32_t at[3] = {x, y, z};
-            double place[3];
-            int outside = 0;
-            for (int axis = 0; axis < 3; ++axis) {
-              outside += at[axis] < ghosts || at[axis] >= cells[axis] - ghosts;
-              place[axis] =
-                  (source_of(first[axis] + at[axis], n, is_periodic) + 0.5 + arrays[i].offset[axis]) * h;
-            }
-            if (outside > 1) continue;
-            store(&arrays[i], at, field(place[0], place[1], place[2], 0.3 * step));
-          }
-        }
-      }
-    }
+    for (int i = 0; i < count; ++i) simulate(&own, &arrays[i], 0.3 * step);
     wrong += vdi_catalyst_execute(catalyst, step, 0.1 * step) != VDI_CATALYST_OK;
   }
   wrong += vdi_catalyst_finalize(catalyst) != VDI_CATALYST_OK;

@@ -58,6 +58,29 @@ Vector acceleration(const std::vector<Vector>& positions, const Vector& at) {
   return sum;
 }
 
+/// Hands over this rank's slab of the lattice, and its `count` stars, whose memory stays the same.
+int handOver(const char* json, int rank, int ranks, const Vector* mine, int count, vdi_catalyst** vdi) {
+  const int first = cells * rank / ranks;
+  const int last = cells * (rank + 1) / ranks;
+  int code = vdi_catalyst_initialize_json(MPI_Comm_c2f(MPI_COMM_WORLD), json, vdi);
+  const vdi_catalyst_block block = {{cells, cells, last - first},
+                                    {0, 0, 0},
+                                    {0, 0, 0},
+                                    {-size / 2, -size / 2, -size / 2 + first * spacing},
+                                    {spacing, spacing, spacing}};
+  if (code == VDI_CATALYST_OK) code = vdi_catalyst_set_blocks(*vdi, 1, &block);
+  vdi_catalyst_particles particles{};
+  particles.count = count;
+  particles.kind = VDI_CATALYST_DENSITY;
+  particles.position_type = VDI_CATALYST_F64;
+  for (std::size_t axis = 0; axis < 3; ++axis) particles.positions[axis] = mine->data() + axis;
+  particles.position_stride = sizeof(Vector);
+  particles.weights = &mass;  // a stride of 0: all stars have this mass
+  particles.weight_type = VDI_CATALYST_F64;
+  if (code == VDI_CATALYST_OK) code = vdi_catalyst_set_particles(*vdi, "density", &particles);
+  return code;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -77,30 +100,10 @@ int main(int argc, char** argv) {
   place(positions, velocities);
 
   const auto own = static_cast<std::size_t>(rank);
-
   vdi_catalyst* vdi = nullptr;
   int code = VDI_CATALYST_OK;
-  const int first = cells * rank / ranks;
-  const int last = cells * (rank + 1) / ranks;
-  if (argc > 1) {
-    code = vdi_catalyst_initialize_json(MPI_Comm_c2f(MPI_COMM_WORLD), argv[1], &vdi);
-    const vdi_catalyst_block block = {{cells, cells, last - first},
-                                      {0, 0, 0},
-                                      {0, 0, 0},
-                                      {-size / 2, -size / 2, -size / 2 + first * spacing},
-                                      {spacing, spacing, spacing}};
-    if (code == VDI_CATALYST_OK) code = vdi_catalyst_set_blocks(vdi, 1, &block);
-    const double* mine = positions[static_cast<std::size_t>(starts[own] / 3)].data();
-    vdi_catalyst_particles particles{};
-    particles.count = counts[own] / 3;
-    particles.kind = VDI_CATALYST_DENSITY;
-    particles.position_type = VDI_CATALYST_F64;
-    for (std::size_t axis = 0; axis < 3; ++axis) particles.positions[axis] = mine + axis;
-    particles.position_stride = sizeof(Vector);
-    particles.weights = &mass;  // a stride of 0: all stars have this mass
-    particles.weight_type = VDI_CATALYST_F64;
-    if (code == VDI_CATALYST_OK) code = vdi_catalyst_set_particles(vdi, "density", &particles);
-  }
+  Vector* mine = &positions[static_cast<std::size_t>(starts[own] / 3)];
+  if (argc > 1) code = handOver(argv[1], rank, ranks, mine, counts[own] / 3, &vdi);
   for (int step = 1; step <= steps; ++step) {
     for (int i = starts[own] / 3; i < (starts[own] + counts[own]) / 3; ++i) {
       const auto star = static_cast<std::size_t>(i);
@@ -120,9 +123,8 @@ int main(int argc, char** argv) {
 
   MPI_File file = MPI_FILE_NULL;
   MPI_File_open(MPI_COMM_WORLD, "clusters.raw", MPI_MODE_CREATE | MPI_MODE_WRONLY, MPI_INFO_NULL, &file);
-  MPI_File_write_at_all(file, starts[own] * static_cast<MPI_Offset>(sizeof(double)),
-                        positions[static_cast<std::size_t>(starts[own] / 3)].data(), counts[own], MPI_DOUBLE,
-                        MPI_STATUS_IGNORE);
+  MPI_File_write_at_all(file, starts[own] * static_cast<MPI_Offset>(sizeof(double)), mine->data(),
+                        counts[own], MPI_DOUBLE, MPI_STATUS_IGNORE);
   MPI_File_close(&file);
   MPI_Finalize();
   return code == VDI_CATALYST_OK ? 0 : 3;
