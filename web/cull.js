@@ -70,6 +70,29 @@ bool meetsColumn(Ray corners[4], bool byColumns, int tile, int first, int last) 
   return false;
 }
 
+// Whether the rays may meet material between two lists and two depths of V_O's picture.
+bool meetsTiles(Ray corners[4], ivec2 first, ivec2 last, vec2 depths) {
+  ivec2 firstTile = first >> 3;
+  ivec2 lastTile = last >> 3;
+  ivec2 span = lastTile - firstTile + 1;
+  const int few = 16;
+  if (span.x * span.y <= few) {  // the rays hardly move in the picture: look at all tiles
+    uvec2 mask = maskBetween((depths - nearest) * binScale);
+    for (int y = firstTile.y; y <= lastTile.y; ++y) {
+      for (int x = firstTile.x; x <= lastTile.x; ++x) {
+        if (sharesBit(tileMask(false, ivec2(x, y)), mask)) return true;
+      }
+    }
+    return false;
+  }
+  bool byColumns = span.x >= span.y;
+  int end = byColumns ? lastTile.x : lastTile.y;
+  for (int tile = byColumns ? firstTile.x : firstTile.y; tile <= end; ++tile) {
+    if (meetsColumn(corners, byColumns, tile, byColumns ? first.x : first.y, byColumns ? last.x : last.y)) return true;
+  }
+  return false;
+}
+
 bool mayShow(Ray corners[4]) {
   vec4 originX = vec4(corners[0].origin.x, corners[1].origin.x, corners[2].origin.x, corners[3].origin.x);
   vec4 originY = vec4(corners[0].origin.y, corners[1].origin.y, corners[2].origin.y, corners[3].origin.y);
@@ -110,27 +133,7 @@ bool mayShow(Ray corners[4]) {
     high = clamp(vec2(max(most(xIn), most(xOut)), max(most(yIn), most(yOut))) + middle + spare, low, high);
     depths = clamp(vec2(min(least(depthsIn), least(depthsOut)), max(most(depthsIn), most(depthsOut))), nearest, farthest);
   }
-  ivec2 first = min(ivec2(low), lists - 1);
-  ivec2 last = min(ivec2(high), lists - 1);
-  ivec2 firstTile = first >> 3;
-  ivec2 lastTile = last >> 3;
-  ivec2 span = lastTile - firstTile + 1;
-  const int few = 16;
-  if (span.x * span.y <= few) {  // the rays hardly move in the picture: look at all tiles
-    uvec2 mask = maskBetween((depths - nearest) * binScale);
-    for (int y = firstTile.y; y <= lastTile.y; ++y) {
-      for (int x = firstTile.x; x <= lastTile.x; ++x) {
-        if (sharesBit(tileMask(false, ivec2(x, y)), mask)) return true;
-      }
-    }
-    return false;
-  }
-  bool byColumns = span.x >= span.y;
-  int end = byColumns ? lastTile.x : lastTile.y;
-  for (int tile = byColumns ? firstTile.x : firstTile.y; tile <= end; ++tile) {
-    if (meetsColumn(corners, byColumns, tile, byColumns ? first.x : first.y, byColumns ? last.x : last.y)) return true;
-  }
-  return false;
+  return meetsTiles(corners, min(ivec2(low), lists - 1), min(ivec2(high), lists - 1), depths);
 }
 
 void main() {

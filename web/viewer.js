@@ -73,19 +73,24 @@ export class Viewer {
     this.onRest = () => {};
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.restTimer = undefined;
-    canvas.addEventListener("webglcontextlost", (event) => {
+    this.watchDriver();
+  }
+
+  /** Tells users when the graphics driver loses the picture, and draws it again when the driver recovers. */
+  watchDriver() {
+    this.canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault();
       this.isLost = true;
       this.pending = undefined;
-      tell("The graphics driver has lost the picture. It will return when the driver recovers.");
+      this.tell("The graphics driver has lost the picture. It will return when the driver recovers.");
     });
-    canvas.addEventListener("webglcontextrestored", () => {
+    this.canvas.addEventListener("webglcontextrestored", () => {
       this.isLost = false;
       try {
         this.renderer.restore();
-        tell("");
+        this.tell("");
       } catch (error) {
-        tell(/** @type {Error} */ (error).message);
+        this.tell(/** @type {Error} */ (error).message);
       }
       this.redraw();
     });
