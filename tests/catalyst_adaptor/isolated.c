@@ -66,6 +66,24 @@ static double* at(double* field, int x, int y, int z) {
   return field + ((size_t)z * side + (size_t)y) * side + (size_t)x;
 }
 
+/* Each rank's box is hottest in its middle. */
+static void heat_middle(void) {
+  const size_t side = (size_t)size + 2;
+  now = calloc(side * side * side, sizeof *now);
+  next = calloc(side * side * side, sizeof *next);
+  if (now == NULL || next == NULL) MPI_Abort(MPI_COMM_WORLD, 3);
+  for (int z = 1; z <= size; ++z) {
+    for (int y = 1; y <= size; ++y) {
+      for (int x = 1; x <= size; ++x) {
+        const double dx = (x - 0.5) / size - 0.5;
+        const double dy = (y - 0.5) / size - 0.5;
+        const double dz = (z - 0.5) / size - 0.5;
+        *at(now, x, y, z) = 1.0 / (1.0 + 20.0 * (dx * dx + dy * dy + dz * dz));
+      }
+    }
+  }
+}
+
 static void spread(void) {
   for (int z = 1; z <= size; ++z) {
     for (int y = 1; y <= size; ++y) {
@@ -140,6 +158,27 @@ static long microseconds_since(double start) {
   return (long)(1e6 * spent);
 }
 
+static void set_arrays(vdi_catalyst* catalyst, int rank) {
+  const int64_t row = (int64_t)sizeof *now * (size + 2);
+  const vdi_catalyst_strides strides = {{sizeof *now, row, row * (size + 2)}, 0};
+  const void* data[] = {at(now, 1, 1, 1)};
+  const int is_unequal = getenv("VDI_TEST_UNEQUAL") != NULL;
+  for (int i = 0; i < 1 + is_unequal; ++i) {
+    const char* name = i == 0 || rank > 0 ? "T" : "W";
+    vdi_catalyst_set_array_strided(catalyst, name, VDI_CATALYST_F64, VDI_CATALYST_CELLS, 1, data, &strides);
+  }
+}
+
+/* Files can't grow beyond VDI_TEST_FILE_LIMIT during the first three steps. */
+static void limit_files(int step) {
+  const int most = number_of("VDI_TEST_FILE_LIMIT", 0);
+  if (most == 0 || (step != 0 && step != 3)) return;
+  struct rlimit limit;
+  getrlimit(RLIMIT_FSIZE, &limit);
+  limit.rlim_cur = step == 0 ? (rlim_t)most : limit.rlim_max;
+  setrlimit(RLIMIT_FSIZE, &limit);
+}
+
 int main(int argc, char** argv) {
   int rank = 0;
   int ranks = 0;
@@ -151,20 +190,7 @@ int main(int argc, char** argv) {
   const int kill_step = number_of("VDI_TEST_KILL", -1);
   const int pause = number_of("VDI_TEST_PAUSE", 0);
   const char* busy = getenv("VDI_TEST_BUSY");
-  const size_t side = (size_t)size + 2;
-  now = calloc(side * side * side, sizeof *now);
-  next = calloc(side * side * side, sizeof *next);
-  if (now == NULL || next == NULL) MPI_Abort(MPI_COMM_WORLD, 3);
-  for (int z = 1; z <= size; ++z) {
-    for (int y = 1; y <= size; ++y) {
-      for (int x = 1; x <= size; ++x) {
-        const double dx = (x - 0.5) / size - 0.5;
-        const double dy = (y - 0.5) / size - 0.5;
-        const double dz = (z - 0.5) / size - 0.5;
-        *at(now, x, y, z) = 1.0 / (1.0 + 20.0 * (dx * dx + dy * dy + dz * dz));
-      }
-    }
-  }
+  heat_middle();
 
   vdi_catalyst* catalyst = NULL;
   const int has_library = strcmp(argv[1], "-") != 0;
@@ -179,14 +205,8 @@ int main(int argc, char** argv) {
         {size, size, size}, {0, 0, 0}, {0, 0, 0}, {rank, 0.0, 0.0}, {1.0 / size, 1.0 / size, 1.0 / size}};
     wrong += differs(vdi_catalyst_set_blocks(catalyst, 1, &block));
   }
-  const int file_limit = number_of("VDI_TEST_FILE_LIMIT", 0);
   for (int step = 0; step < steps; ++step) {
-    if (file_limit > 0 && rank == ranks - 1 && (step == 0 || step == 3)) {
-      struct rlimit limit;
-      getrlimit(RLIMIT_FSIZE, &limit);
-      limit.rlim_cur = step == 0 ? (rlim_t)file_limit : limit.rlim_max;
-      setrlimit(RLIMIT_FSIZE, &limit);
-    }
+    if (rank == ranks - 1) limit_files(step);
     const int is_busy = busy != NULL && access(busy, F_OK) != 0;
     pid_t worker = 0;
     pthread_t killer;
@@ -195,15 +215,7 @@ int main(int argc, char** argv) {
     for (int i = 0; i < repeat; ++i) spread();
     int code = 0;
     if (has_library) {
-      const vdi_catalyst_strides strides = {
-          {sizeof *now, (int64_t)(side * sizeof *now), (int64_t)(side * side * sizeof *now)}, 0};
-      const void* data[] = {at(now, 1, 1, 1)};
-      const int is_unequal = getenv("VDI_TEST_UNEQUAL") != NULL;
-      for (int i = 0; i < 1 + is_unequal; ++i) {
-        const char* name = i == 0 || rank > 0 ? "T" : "W";
-        vdi_catalyst_set_array_strided(catalyst, name, VDI_CATALYST_F64, VDI_CATALYST_CELLS, 1, data,
-                                       &strides);
-      }
+      set_arrays(catalyst, rank);
       if (step == kill_step && rank == ranks - 1) {
         worker = worker_of(rank);
         if (worker == 0) fprintf(stderr, "rank %d has no worker\n", rank);
