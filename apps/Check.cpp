@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "apps/Commands.h"
-#include "apps/Help.h"
 #include "vdi/config/ColorMap.h"
 #include "vdi/config/Run.h"
 #include "vdi/core/ScalarRange.h"

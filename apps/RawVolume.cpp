@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 
 #include "apps/JsonFile.h"
 #include "vdi/core/Error.h"

@@ -20,7 +20,6 @@
 #include "vdi/io/VdiFile.h"
 #include "vdi/pipeline/VdiRenderer.h"
 #include "vdi/stream/Client.h"
-#include "vdi/stream/GivenToken.h"
 
 namespace vdi::apps {
 

@@ -1,7 +1,6 @@
 #include "apps/Relay.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 

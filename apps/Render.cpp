@@ -4,7 +4,6 @@
 
 #include <poll.h>
 
-#include <chrono>
 #include <filesystem>
 #include <optional>
 #include <set>

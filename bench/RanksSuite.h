@@ -5,7 +5,6 @@
 #include <glm/glm.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <string>
 #include <vector>
 
 #include "bench/Suites.h"
