@@ -1,19 +1,14 @@
 // The cell arrays that the engines make from a simulation's particles.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "catalyst_adaptor/Fields.h"
-#include "catalyst_adaptor/ParticleArray.h"
-#include "catalyst_adaptor/vdi_catalyst.h"
 #include "vdi/comm/Communicator.h"
-#include "vdi/core/Block.h"
 #include "vdi/gpu/Device.h"
 #include "vdi/pipeline/ParticleDepositor.h"
 

@@ -3,7 +3,6 @@
 #include <mpi.h>
 
 #include <array>
-#include <cstring>
 #include <memory>
 #include <new>
 #include <optional>

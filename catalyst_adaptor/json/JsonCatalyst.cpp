@@ -2,7 +2,6 @@
 #include <mpi.h>
 
 #include <chrono>
-#include <cstring>
 #include <memory>
 #include <optional>
 #include <string>

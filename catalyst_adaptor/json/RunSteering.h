@@ -1,7 +1,6 @@
 // Applies the requests of a stream's viewers on all ranks, after the same step.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <exception>
 #include <string>

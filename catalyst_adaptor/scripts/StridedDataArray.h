@@ -12,7 +12,6 @@
 #include <cstring>
 #include <glm/glm.hpp>
 #include <mutex>
-#include <new>
 #include <optional>
 #include <typeinfo>
 
