@@ -9,9 +9,10 @@
 #include <vtkObjectFactory.h>
 #include <vtkPVArrayInformation.h>
 #include <vtkPVDataInformation.h>
+#include <vtkPVTemporalDataInformation.h>
 #include <vtkProcessModule.h>
 #include <vtkSMComparativeViewProxy.h>
-#include <vtkSMInputProperty.h>
+#include <vtkSMOutputPort.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMProxy.h>
 #include <vtkSMProxyIterator.h>
@@ -358,10 +359,19 @@ std::string vtkSMVDIGeneratorProxy::WhyNot(vtkSMViewProxy* view) {
   return {};
 }
 
-vtkPVDataInformation* vtkSMVDIGeneratorProxy::InputInformation() {
+vtkPVDataInformation* vtkSMVDIGeneratorProxy::InputInformation(bool overTime) {
   const vtkSMPropertyHelper input(this, "Input");
   auto* source = vtkSMSourceProxy::SafeDownCast(input.GetAsProxy());
-  return source != nullptr ? source->GetDataInformation(input.GetOutputPort()) : nullptr;
+  if (source == nullptr) return nullptr;
+  if (!overTime) return source->GetDataInformation(input.GetOutputPort());
+  vtkSMOutputPort* port = source->GetOutputPort(input.GetOutputPort());
+  return port != nullptr ? port->GetTemporalDataInformation() : nullptr;
+}
+
+vtkPVArrayInformation* vtkSMVDIGeneratorProxy::InputArray(bool overTime) {
+  const Subject now = this->CurrentSubject();
+  vtkPVDataInformation* data = this->InputInformation(overTime);
+  return data != nullptr ? data->GetArrayInformation(now.Array.c_str(), now.Association) : nullptr;
 }
 
 vdi::Box vtkSMVDIGeneratorProxy::ShownBounds() {

@@ -44,6 +44,7 @@ struct Box;
 struct VdiEstimate;
 }  // namespace vdi
 class vtkMultiProcessController;
+class vtkPVArrayInformation;
 class vtkPVDataInformation;
 class vtkSMRenderViewProxy;
 class vtkSMViewProxy;
@@ -76,6 +77,13 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
 
   /// Makes the next update count as the first again. Call it when a user undoes the first Apply.
   void Forget();
+
+  /// The input, as it is now or over all its time steps; null if there is none.
+  vtkPVDataInformation* InputInformation(bool overTime = false);
+  /// The array that is set, in that information of the input; null if it is missing.
+  vtkPVArrayInformation* InputArray(bool overTime = false);
+  /// The opacity function that is set, or else that of the map; null if there is none.
+  vtkSMProxy* OpacityFunction();
 
   /// The view, or a comparative view's root view; null if that isn't a render view.
   static vtkSMRenderViewProxy* RenderViewOf(vtkSMProxy* view);
@@ -159,8 +167,6 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   vtkSMViewProxy* ActiveView();
   /// The active view if the proxy may take properties from it; null otherwise.
   vtkSMRenderViewProxy* ViewToTakeFrom();
-  /// Null if there is no input.
-  vtkPVDataInformation* InputInformation();
   /// The bounds of a VDI of the input: those of its part in the cropping box, if there is one. A VDI that
   /// shows nothing has the input's.
   vdi::Box ShownBounds();

@@ -102,15 +102,18 @@ void vtkSMVDIGeneratorProxy::FitToComponent() {
   vtkSMProxy* map = this->WatchedMap;
   const bool hasRange = this->RangeOfScalars(now.Array.c_str(), now.Association, std::nullopt, range);
   if (hasRange && pv::mayRescale(map)) {
-    vtkSMProxy* opacity = pv::proxyIn(this, "ScalarOpacityFunction");
-    if (opacity == nullptr) opacity = pv::proxyIn(map, "ScalarOpacityFunction");
-    vtkSMTransferFunctionProxy::RescaleTransferFunction(map, range[0], range[1]);
-    if (opacity != nullptr) vtkSMTransferFunctionProxy::RescaleTransferFunction(opacity, range[0], range[1]);
+    vtkSMTransferFunctionProxy::RescaleTransferFunction(map, range);
+    vtkSMTransferFunctionProxy::RescaleTransferFunction(this->OpacityFunction(), range);
   }
   if (hasRange) this->AnnounceComponent(map, range);
   // The window holds a filter whose map changes, and would make a VDI of the old component with the new map.
   this->InvokeCommand("Release");
   this->MarkDirty(this);
+}
+
+vtkSMProxy* vtkSMVDIGeneratorProxy::OpacityFunction() {
+  vtkSMProxy* set = pv::proxyIn(this, "ScalarOpacityFunction");
+  return set != nullptr ? set : pv::proxyIn(pv::proxyIn(this, "LookupTable"), "ScalarOpacityFunction");
 }
 
 void vtkSMVDIGeneratorProxy::AnnounceComponent(vtkSMProxy* map, const double range[2]) {
@@ -161,8 +164,8 @@ void vtkSMVDIGeneratorProxy::ChooseLookupTable(std::optional<double> time, const
   if (mapWaits || opacityWaits) {
     double range[2];
     if (!this->RangeOfScalars(name, scalars.GetAsInt(3), time, range)) return;  // there are no data yet
-    if (mapWaits) vtkSMTransferFunctionProxy::RescaleTransferFunction(map, range[0], range[1]);
-    if (opacityWaits) vtkSMTransferFunctionProxy::RescaleTransferFunction(opacity, range[0], range[1]);
+    if (mapWaits) vtkSMTransferFunctionProxy::RescaleTransferFunction(map, range);
+    if (opacityWaits) vtkSMTransferFunctionProxy::RescaleTransferFunction(opacity, range);
   }
   table.Set(map);
   this->UpdateVTKObjects();

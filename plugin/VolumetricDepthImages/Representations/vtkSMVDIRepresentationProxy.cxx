@@ -4,14 +4,10 @@
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
 #include <vtkPVArrayInformation.h>
-#include <vtkPVDataInformation.h>
-#include <vtkPVTemporalDataInformation.h>
 #include <vtkSMCoreUtilities.h>
-#include <vtkSMOutputPort.h>
 #include <vtkSMProperty.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMSessionProxyManager.h>
-#include <vtkSMSourceProxy.h>
 #include <vtkSMTransferFunctionManager.h>
 #include <vtkSMTransferFunctionProxy.h>
 #include <vtkScalarsToColors.h>
@@ -96,13 +92,13 @@ void vtkSMVDIRepresentationProxy::DropLegend() {
 vtkSMVDIRepresentationProxy::Legend vtkSMVDIRepresentationProxy::LegendOfInput() {
   vtkSMProxy* input = pv::proxyIn(this, "Input");
   if (input == nullptr) return {};
-  if (vtkSMVDIGeneratorProxy::SafeDownCast(input) == nullptr) return this->LegendOfFile(input);
+  auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(input);
+  if (generator == nullptr) return this->LegendOfFile(input);
   const vtkSMPropertyHelper scalars(input, "SelectInputScalars");
   const char* name = scalars.GetNumberOfElements() > 4 ? scalars.GetAsString(4) : nullptr;
   vtkSMProxy* colors = pv::proxyIn(input, "LookupTable");
   if (name == nullptr || *name == '\0' || colors == nullptr) return {};
-  vtkSMProxy* opacities = pv::proxyIn(input, "ScalarOpacityFunction");
-  return {name, colors, opacities != nullptr ? opacities : pv::proxyIn(colors, "ScalarOpacityFunction")};
+  return {name, colors, generator->OpacityFunction()};
 }
 
 vtkSMVDIRepresentationProxy::Legend vtkSMVDIRepresentationProxy::LegendOfFile(vtkSMProxy* reader) {
@@ -168,29 +164,17 @@ void vtkSMVDIRepresentationProxy::TakeLegend(vtkSMProxy* view) {
 /// Lets the bars of the map name the component of the filter's array. The view may still show a VDI of
 /// another array, and ParaView calls the component of an array that it can't find "Magnitude".
 void vtkSMVDIRepresentationProxy::NameComponent(vtkSMProxy* colors) {
-  vtkSMProxy* generator = vtkSMVDIGeneratorProxy::SafeDownCast(pv::proxyIn(this, "Input"));
-  if (generator == nullptr) return;
-  const vtkSMPropertyHelper input(generator, "Input");
-  const vtkSMPropertyHelper scalars(generator, "SelectInputScalars");
-  auto* source = vtkSMSourceProxy::SafeDownCast(input.GetAsProxy());
-  if (source == nullptr || scalars.GetNumberOfElements() < 5) return;
-  vtkPVArrayInformation* array = source->GetDataInformation(input.GetOutputPort())
-                                     ->GetArrayInformation(scalars.GetAsString(4), scalars.GetAsInt(3));
+  auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(pv::proxyIn(this, "Input"));
+  vtkPVArrayInformation* array = generator != nullptr ? generator->InputArray() : nullptr;
   if (array != nullptr) vtkSMTransferFunctionProxy::UpdateScalarBarsComponentTitle(colors, array);
 }
 
 bool vtkSMVDIRepresentationProxy::RescaleTransferFunctionToDataRangeOverTime(const char* arrayname,
                                                                              int attribute_type) {
-  vtkSMProxy* generator = vtkSMVDIGeneratorProxy::SafeDownCast(pv::proxyIn(this, "Input"));
+  auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(pv::proxyIn(this, "Input"));
   if (generator == nullptr || !this->HasLegend())
     return this->Superclass::RescaleTransferFunctionToDataRangeOverTime(arrayname, attribute_type);
-  const vtkSMPropertyHelper input(generator, "Input");
-  auto* source = vtkSMSourceProxy::SafeDownCast(input.GetAsProxy());
-  vtkSMOutputPort* port = source != nullptr ? source->GetOutputPort(input.GetOutputPort()) : nullptr;
-  const vtkSMPropertyHelper scalars(generator, "SelectInputScalars");
-  if (port == nullptr || scalars.GetNumberOfElements() < 5) return false;
-  vtkPVArrayInformation* array =
-      port->GetTemporalDataInformation()->GetArrayInformation(scalars.GetAsString(4), scalars.GetAsInt(3));
+  vtkPVArrayInformation* array = generator->InputArray(true);
   if (array == nullptr) return false;
   double range[2] = {-std::numbers::pi, std::numbers::pi};
   const int wanted = vtkSMPropertyHelper(generator, "Component").GetAsInt();
