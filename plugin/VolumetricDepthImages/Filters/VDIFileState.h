@@ -2,7 +2,6 @@
 #ifndef VDIFileState_h
 #define VDIFileState_h
 
-#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>

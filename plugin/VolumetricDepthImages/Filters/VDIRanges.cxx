@@ -16,7 +16,6 @@
 #include <cstddef>
 #include <limits>
 #include <mutex>
-#include <vector>
 
 #include "vdi/core/Parallel.h"
 

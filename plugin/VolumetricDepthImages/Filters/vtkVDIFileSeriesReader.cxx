@@ -126,11 +126,9 @@ void vtkVDIFileSeriesReader::ShareHeaders(std::vector<Header>& headers) {
 
 int vtkVDIFileSeriesReader::RequestInformation(vtkInformation* request, vtkInformationVector** inputs,
                                                vtkInformationVector* outputs) {
-  vtkMultiProcessController* controller = vtkMultiProcessController::GetGlobalController();
-  const bool root = controller == nullptr || controller->GetLocalProcessId() == 0;
   std::vector<Header> headers;
   try {
-    if (root) headers = this->ReadHeaders();
+    if (pv::isRoot()) headers = this->ReadHeaders();
     this->ShareHeaders(headers);
   } catch (const vdi::Error& error) {
     vtkErrorMacro(<< error.what());

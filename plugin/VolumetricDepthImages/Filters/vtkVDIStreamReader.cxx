@@ -7,7 +7,6 @@
 #include <vtkImageData.h>
 #include <vtkInformation.h>
 #include <vtkInformationVector.h>
-#include <vtkMultiProcessController.h>
 #include <vtkObjectFactory.h>
 
 #include <algorithm>
@@ -23,6 +22,7 @@
 
 #include "VDIImageData.h"
 #include "VDIRetire.h"
+#include "VDISession.h"
 #include "VDIValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
@@ -36,11 +36,6 @@
 vtkStandardNewMacro(vtkVDIStreamReader);
 
 namespace {
-
-bool isFirstRank() {
-  vtkMultiProcessController* controller = vtkMultiProcessController::GetGlobalController();
-  return controller == nullptr || controller->GetLocalProcessId() == 0;
-}
 
 const char* nameOf(vdi::stream::Phase phase) {
   switch (phase) {
@@ -298,7 +293,7 @@ vtkTypeBool vtkVDIStreamReader::ProcessRequest(vtkInformation* request, vtkInfor
 
 int vtkVDIStreamReader::RequestInformation(vtkInformation*, vtkInformationVector**,
                                            vtkInformationVector* outputs) {
-  if (isFirstRank() && !this->Connected) {
+  if (pv::isRoot() && !this->Connected) {
     this->Connect();
     if (this->Connected) {
       this->Connected->WaitForFirst(this->Patience);
@@ -320,7 +315,7 @@ int vtkVDIStreamReader::RequestInformation(vtkInformation*, vtkInformationVector
 int vtkVDIStreamReader::RequestData(vtkInformation*, vtkInformationVector**, vtkInformationVector* outputs) {
   vtkImageData* output = vtkImageData::GetData(outputs);
   output->Initialize();
-  if (!isFirstRank()) return 1;
+  if (!pv::isRoot()) return 1;
   if (this->Trouble.empty()) {
     this->Failure.isOver();
   } else if (this->Failure.isNew(this, this->Trouble)) {

@@ -16,7 +16,6 @@
 #include "VDIImageData.h"
 #include "VDIReport.h"
 #include "vdi/core/Error.h"
-#include "vdi/core/Image.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
 #include "vdi/page/Page.h"

@@ -16,7 +16,6 @@
 #include <QVBoxLayout>
 
 #include <optional>
-#include <string>
 
 #include "VDIViewpoint.h"
 #include "vdi/core/ComponentValues.h"

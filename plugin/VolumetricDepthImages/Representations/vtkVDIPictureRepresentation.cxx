@@ -22,8 +22,6 @@
 #include <vtkTexture.h>
 #include <vtkUnsignedCharArray.h>
 
-#include <algorithm>
-
 #include "VDIPlace.h"
 #include "VDIUpdate.h"
 #include "vdi/core/Error.h"
