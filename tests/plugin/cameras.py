@@ -28,14 +28,8 @@ colors, opacity = set_colors("RTData", 37, 277)
 
 
 def filter_at(camera, array="RTData", **properties):
-    image = simple.VolumetricDepthImage(Input=two_arrays)
-    image.SelectInputScalars = ["POINTS", array]
-    image.LookupTable, image.ScalarOpacityFunction = colors, opacity
-    image.Resolution = [96, 72]
-    image.CameraPosition, image.CameraFocalPoint = CAMERAS[camera], [31, 31, 31]
-    for key, value in properties.items():
-        setattr(image, key, value)
-    return image
+    return filter_with(two_arrays, "POINTS", array, LookupTable=colors, ScalarOpacityFunction=opacity, Resolution=[96, 72],
+                       CameraPosition=CAMERAS[camera], CameraFocalPoint=[31, 31, 31], **properties)
 
 
 def lists(image, at=0.0):

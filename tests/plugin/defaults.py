@@ -33,19 +33,7 @@ def field(center, scale=1.0):
 
 
 def filter_of(source, association="POINTS", name="ball", **properties):
-    image = simple.VolumetricDepthImage(Input=source)
-    image.SelectInputScalars = [association, name]
-    image.Resolution = SIZE
-    for key, value in properties.items():
-        setattr(image, key, value)
-    return image
-
-
-def errors_of(proxy):
-    with Messages("ErrorEvent") as texts:
-        # With a time: without one, ParaView skips the update when nothing has changed.
-        proxy.UpdatePipeline(0.0)
-    return "\n".join(texts)
+    return filter_with(source, association, name, Resolution=SIZE, **properties)
 
 
 source = producer_of(field([7, 0, -3]))
@@ -102,12 +90,12 @@ for association, name, words in (
         missing = [word for word in words if word not in "".join(texts)]
         check(not missing, "%s of %s: the %s error says what there is %s" % (name, association, attempt, missing))
         check(len(texts) == 1, "%s of %s: the %s error is the only one: %d" % (name, association, attempt, len(texts)))
-        check(not errors_of(wrong),
+        check(not errors_of_update(wrong),
               "%s of %s: the %s error isn't repeated as long as the array stays wrong" % (name, association, attempt))
         wrong.SelectInputScalars = ["POINTS", "ball"]
-        check(not errors_of(wrong), "after a wrong array, another one is fine")
+        check(not errors_of_update(wrong), "after a wrong array, another one is fine")
         wrong.SelectInputScalars = [association, name]
-check(not errors_of(filter_of(source, "CELLS", "layers")), "an array of cells is fine")
+check(not errors_of_update(filter_of(source, "CELLS", "layers")), "an array of cells is fine")
 
 
 # Colour maps: the default keeps its first range, whatever updates the filter; set points stay.
@@ -156,7 +144,7 @@ preset.ApplyPreset("Cool to Warm", True)
 simple.GetOpacityTransferFunction("preset").Points = [0, 0, 0.5, 0, 2, 1, 0.5, 0]
 filter_of(producer_of(renamed(field([0, 0, 0]), "preset")), name="preset").UpdatePipeline()
 check(range_of("preset") == [0, 4, 0, 2], "a preset waits for the range, opacities set with it don't move")
-check(not errors_of(filter_of(source, "POINTS", "velocity", Component=0)), "a component is rendered")
+check(not errors_of_update(filter_of(source, "POINTS", "velocity", Component=0)), "a component is rendered")
 check(range_of("velocity") == [-1, 3, -1, 3], "the map of a component has the component's range, not the magnitude's")
 
 # A VDI's output has field arrays, one of them with the name of the array. They aren't offered.
@@ -171,7 +159,7 @@ simple.SetActiveSource(None)
 # Data without arrays.
 bare = vtkImageData()
 bare.SetDimensions(5, 5, 5)
-said = errors_of(simple.VolumetricDepthImage(Input=producer_of(bare)))
+said = errors_of_update(simple.VolumetricDepthImage(Input=producer_of(bare)))
 check(said.count("ERROR") == 1 and "the data have no arrays" in said, "data without arrays get one message: " + said)
 
 # The panel hides properties that have no effect on a VDI, by names that this ParaView's representation has.

@@ -18,11 +18,7 @@ def vdi_of_wavelet(association):
     source = simple.Wavelet()
     if association == "CELLS":
         source = simple.PointDatatoCellData(Input=source)
-    image = simple.VolumetricDepthImage(Input=source)
-    image.SelectInputScalars = [association, "RTData"]
-    image.Resolution = [160, 120]
-    image.CameraPosition = [60, 45, 75]
-    return image
+    return filter_with(source, association, "RTData", Resolution=[160, 120], CameraPosition=[60, 45, 75])
 
 
 for association in ("POINTS", "CELLS"):

@@ -16,22 +16,8 @@ def with_camera(proxy):
 
 
 def vdi_of(source, array=("POINTS", "RTData"), **properties):
-    image = with_camera(simple.VolumetricDepthImage(Input=source))
-    image.SelectInputScalars = list(array)
-    image.Resolution = [120, 90]
-    for key, value in properties.items():
-        setattr(image, key, value)
-    return image
-
-
-def errors_of(action):
-    """The errors that VTK reports while `action` runs."""
-    with Messages("ErrorEvent") as texts:
-        try:
-            action()
-        except RuntimeError as error:
-            texts.append(str(error))
-    return texts
+    return filter_with(source, *array, **{"CameraPosition": POSITION, "CameraFocalPoint": FOCAL_POINT,
+                                          "Resolution": [120, 90], **properties})
 
 
 wavelet = simple.Wavelet(WholeExtent=[-12, 12, -12, 12, -12, 12])

@@ -14,11 +14,7 @@ wavelet = simple.Wavelet()
 
 
 def filter_at(*position):
-    image = simple.VolumetricDepthImage(Input=wavelet)
-    image.SelectInputScalars = ["POINTS", "RTData"]
-    image.Resolution = [160, 120]
-    image.CameraPosition = position
-    return image
+    return filter_with(wavelet, "POINTS", "RTData", Resolution=[160, 120], CameraPosition=position)
 
 
 image, sharing = filter_at(60, 45, 75), filter_at(-60, 45, 75)

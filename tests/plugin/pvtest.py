@@ -201,19 +201,21 @@ def paraview_volume(source, view, association, name, unit_distance, keep_range=F
     return screenshot(view, None, size)
 
 
-def vdi_filter(source, view, association, name, unit_distance, **properties):
-    """VolumetricDepthImage with the view's camera and size."""
+def filter_with(source, association, name, **properties):
+    """VolumetricDepthImage of an array, with these properties."""
     image = simple.VolumetricDepthImage(Input=source)
     image.SelectInputScalars = [association, name]
-    image.ScalarOpacityUnitDistance = unit_distance
-    image.Resolution = view.ViewSize
-    image.CameraPosition, image.CameraFocalPoint = view.CameraPosition, view.CameraFocalPoint
-    image.CameraViewUp, image.CameraViewAngle = view.CameraViewUp, view.CameraViewAngle
-    image.CameraParallelProjection = view.CameraParallelProjection
-    image.CameraParallelScale = view.CameraParallelScale
     for key, value in properties.items():
         setattr(image, key, value)
     return image
+
+
+def vdi_filter(source, view, association, name, unit_distance, **properties):
+    """VolumetricDepthImage with the view's camera and size."""
+    camera = {key: getattr(view, key) for key in ("CameraPosition", "CameraFocalPoint", "CameraViewUp", "CameraViewAngle",
+                                                  "CameraParallelProjection", "CameraParallelScale")}
+    return filter_with(source, association, name, **{"ScalarOpacityUnitDistance": unit_distance, "Resolution": view.ViewSize,
+                                                     **camera, **properties})
 
 
 def picture(proxy):
@@ -329,6 +331,21 @@ class Messages:
     def __exit__(self, *error):
         for observer in self.observers:
             vtkOutputWindow.GetInstance().RemoveObserver(observer)
+
+
+def errors_of(action):
+    """The errors of VTK and Python while `action` runs."""
+    with Messages("ErrorEvent") as texts:
+        try:
+            action()
+        except RuntimeError as error:
+            texts.append(str(error))
+    return texts
+
+
+def errors_of_update(proxy):
+    """The errors of an update. It has a time: without one, ParaView skips the update when nothing has changed."""
+    return "\n".join(errors_of(lambda: proxy.UpdatePipeline(0.0)))
 
 
 def standard_error(action):
