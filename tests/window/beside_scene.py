@@ -4,12 +4,11 @@ measure the time of the VDI alone."""
 
 import os
 import sys
-import traceback
 
 from paraview import simple
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.environ["VDI_TEST_SOURCE"]), "window"))
-from inside import OUTPUT, answer, leave  # noqa: E402
+from inside import OUTPUT, show_and_answer  # noqa: E402
 
 SIZE = 96
 
@@ -116,24 +115,4 @@ def is_played():
     return simple.GetAnimationScene().SMProxy.GetProperty("AnimationTime").GetElement(0) < 3.0
 
 
-def show_scene():
-    simple.LoadPlugin(os.environ["VDI_PLUGIN"], remote=False, ns=globals())
-    view = simple.GetActiveViewOrCreate("RenderView")
-    source = simple.ProgrammableSource(registrationName="Scene", OutputDataSetType="vtkImageData",
-                                       ScriptRequestInformation=INFORMATION, Script=DATA)
-    source.UpdatePipeline(0.0)
-    shown = simple.Show(source, view)
-    simple.ColorBy(shown, ("POINTS", "small"))
-    shown.SetRepresentationType("Volume")
-    view.ResetCamera()
-    simple.GetAnimationScene().UpdateAnimationUsingDataTimeSteps()
-    simple.SetActiveSource(source)
-    simple.Render(view)
-
-
-try:
-    show_scene()
-    answer(simple.GetActiveView().GetInteractor(), globals())
-    leave("ready", "ok")
-except Exception:
-    leave("ready", traceback.format_exc())
+show_and_answer(INFORMATION, DATA, "small", globals())

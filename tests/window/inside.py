@@ -4,6 +4,8 @@ import json
 import os
 import traceback
 
+from paraview import simple
+
 OUTPUT = os.environ["VDI_TEST_OUTPUT"]
 kept = []  # keeps objects that only VTK refers to, because Python would collect them
 
@@ -33,3 +35,25 @@ def answer(interactor, names):
     interactor.AddObserver("TimerEvent", obey)
     interactor.CreateRepeatingTimer(100)
     kept.extend([interactor, obey])
+
+
+def show_and_answer(information, data, array, names):
+    """Loads the plugin, and shows the output of a programmable source, which has the scripts `information` and `data`, as a
+    volume coloured by `array`. Says "ready". From then on it answers calls of the functions in `names`."""
+    try:
+        simple.LoadPlugin(os.environ["VDI_PLUGIN"], remote=False, ns=names)
+        view = simple.GetActiveViewOrCreate("RenderView")
+        source = simple.ProgrammableSource(registrationName="Scene", OutputDataSetType="vtkImageData",
+                                           ScriptRequestInformation=information, Script=data)
+        source.UpdatePipeline(0.0)
+        shown = simple.Show(source, view)
+        simple.ColorBy(shown, ("POINTS", array))
+        shown.SetRepresentationType("Volume")
+        view.ResetCamera()
+        simple.GetAnimationScene().UpdateAnimationUsingDataTimeSteps()
+        simple.SetActiveSource(source)
+        simple.Render(view)
+        answer(view.GetInteractor(), names)
+        leave("ready", "ok")
+    except Exception:
+        leave("ready", traceback.format_exc())

@@ -3,12 +3,11 @@ answers what views.py asks of it."""
 
 import os
 import sys
-import traceback
 
 from paraview import simple
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.environ["VDI_TEST_SOURCE"]), "window"))
-from inside import answer, leave  # noqa: E402
+from inside import show_and_answer  # noqa: E402
 
 DATA = """
 import numpy as np
@@ -69,23 +68,4 @@ def show_twice():
     simple.RenderAllViews()
 
 
-def show_scene():
-    simple.LoadPlugin(os.environ["VDI_PLUGIN"], remote=False, ns=globals())
-    view = simple.GetActiveViewOrCreate("RenderView")
-    source = simple.ProgrammableSource(registrationName="Scene", OutputDataSetType="vtkImageData",
-                                       ScriptRequestInformation=INFORMATION, Script=DATA)
-    source.UpdatePipeline()
-    shown = simple.Show(source, view)
-    simple.ColorBy(shown, ("POINTS", "velocity"))
-    shown.SetRepresentationType("Volume")
-    view.ResetCamera()
-    simple.SetActiveSource(source)
-    simple.Render(view)
-
-
-try:
-    show_scene()
-    answer(simple.GetActiveView().GetInteractor(), globals())
-    leave("ready", "ok")
-except Exception:
-    leave("ready", traceback.format_exc())
+show_and_answer(INFORMATION, DATA, "velocity", globals())
