@@ -6,8 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
-#include <cstdlib>
-#include <cstring>
 #include <limits>
 #include <numeric>
 #include <string_view>

@@ -1,7 +1,6 @@
 #include "vdi/comm/LocalValues.h"
 
 #include <algorithm>
-#include <cstdint>
 #include <numeric>
 #include <span>
 

@@ -6,7 +6,6 @@
 #include <array>
 #include <cassert>
 #include <cstring>
-#include <type_traits>
 
 #include "vdi/core/BitCast.h"
 #include "vdi/core/Error.h"

@@ -6,7 +6,6 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
-#include <variant>
 
 #include "vdi/core/Camera.h"
 #include "vdi/io/Metadata.h"

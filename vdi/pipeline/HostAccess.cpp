@@ -1,7 +1,6 @@
 #include "vdi/pipeline/HostAccess.h"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 #include "vdi/core/Error.h"

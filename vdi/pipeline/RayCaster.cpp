@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cstdlib>
 #include <ranges>
 
 #include "shaders/shared/quota.h"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 #include <glm/trigonometric.hpp>
 #include <mutex>
 #include <utility>

@@ -7,7 +7,6 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <array>
-#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <mutex>

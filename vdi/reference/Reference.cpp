@@ -1,7 +1,6 @@
 #include "vdi/reference/Reference.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 
 #include "vdi/core/Margin.h"

@@ -20,7 +20,6 @@
 #include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 #include "vdi/stream/Command.h"
 #include "vdi/stream/Pipe.h"

@@ -1,7 +1,6 @@
 #include "vdi/stream/Outbox.h"
 
 #include <algorithm>
-#include <cassert>
 #include <utility>
 
 namespace vdi::stream {

@@ -12,12 +12,10 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/ssl/context.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <cassert>
 #include <chrono>
 #include <future>
 #include <map>
 #include <memory>
-#include <optional>
 #include <thread>
 #include <utility>
 
