@@ -20,7 +20,6 @@
 #include <functional>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include "catalyst_adaptor/vdi_catalyst.h"

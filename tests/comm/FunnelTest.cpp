@@ -4,12 +4,10 @@
 
 #include <array>
 #include <atomic>
-#include <chrono>
 #include <cstring>
 #include <exception>
 #include <functional>
 #include <span>
-#include <string>
 #include <thread>
 #include <vector>
 

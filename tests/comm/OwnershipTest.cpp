@@ -1,6 +1,5 @@
 // Ownership of lists, for any number of ranks. There is no communication.
 #include <algorithm>
-#include <numeric>
 #include <random>
 #include <vector>
 

@@ -4,7 +4,6 @@
 
 #include "tests/Catch.h"
 #include "vdi/config/ColorMap.h"
-#include "vdi/core/Error.h"
 #include "vdi/io/Json.h"
 
 using namespace vdi;

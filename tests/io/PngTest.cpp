@@ -1,7 +1,6 @@
 // PNG files, and pictures from images.
 #include <png.h>
 
-#include <cstring>
 #include <limits>
 
 #include "tests/Catch.h"

@@ -1,6 +1,5 @@
 // Blend modes other than composite: the picture of several ranks is that of one.
 #include <memory>
-#include <vector>
 
 #include "tests/Catch.h"
 #include "tests/Devices.h"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <utility>
 #include <vector>
 
@@ -13,7 +12,6 @@
 #include "tests/pipeline/AgainstReference.h"
 #include "tests/pipeline/Integral.h"
 #include "tests/pipeline/OpticalBounds.h"
-#include "vdi/core/Error.h"
 #include "vdi/core/SettingsTable.h"
 #include "vdi/pipeline/VdiGenerator.h"
 #include "vdi/reference/Reference.h"

@@ -1,6 +1,4 @@
 // VdiRenderer's double buffering, and VDIs with fewer lists.
-#include <cmath>
-#include <cstdlib>
 #include <future>
 #include <vector>
 

@@ -1,7 +1,6 @@
 // Shading: the device compared with the reference, and with an integral in double precision that shares no
 // table, no lattice of samples and no helper with them.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <functional>
@@ -16,7 +15,6 @@
 #include "tests/pipeline/Integral.h"
 #include "tests/pipeline/PictureDifference.h"
 #include "vdi/comm/GhostExchange.h"
-#include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
 #include "vdi/core/SettingsTable.h"
 #include "vdi/pipeline/VdiGenerator.h"

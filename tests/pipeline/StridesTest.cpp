@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
-#include <string_view>
 #include <variant>
 #include <vector>
 

@@ -1,5 +1,4 @@
 // The levels of a frame, made of a VDI and of its file.
-#include <cmath>
 
 #include "tests/Catch.h"
 #include "tests/io/Samples.h"

@@ -4,7 +4,6 @@
 
 #include "tests/Catch.h"
 #include "tests/Devices.h"
-#include "vdi/core/Error.h"
 #include "vdi/core/Scene.h"
 #include "vdi/synthetic/DeviceField.h"
 #include "vdi/synthetic/Fields.h"
