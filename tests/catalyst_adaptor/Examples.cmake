@@ -3,7 +3,7 @@
 set(examplesTest "${CMAKE_CURRENT_SOURCE_DIR}/examples.py")
 set(examplesFolder "${CMAKE_SOURCE_DIR}/catalyst_adaptor/examples")
 
-# vdi_add_example_test(<folder> program arguments...)
+# vdi_add_example_test(<folder> program...)
 function(vdi_add_example_test folder)
   foreach(ranks 1 4)
     set(name example_${folder}_np${ranks})
@@ -16,15 +16,17 @@ function(vdi_add_example_test folder)
     vdi_test_properties(${name} TIMEOUT 120 LABELS paraview ENVIRONMENT "PYTHONPATH=${CMAKE_BINARY_DIR}/python")
     set_tests_properties(${name} PROPERTIES FIXTURES_SETUP example_${folder})
   endforeach()
-  add_test(NAME example_${folder}_ranks COMMAND "${Python3_EXECUTABLE}" "${examplesTest}" compare example_${folder}_np1
-                                                example_${folder}_np4 WORKING_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}")
+  add_test(
+    NAME example_${folder}_ranks
+    COMMAND "${Python3_EXECUTABLE}" "${examplesTest}" compare "${examplesFolder}/${folder}/vdi.json" example_${folder}_np1
+            example_${folder}_np4
+    WORKING_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}")
   vdi_test_properties(example_${folder}_ranks TIMEOUT 60 LABELS paraview ENVIRONMENT "PYTHONPATH=${CMAKE_BINARY_DIR}/python")
   set_tests_properties(example_${folder}_ranks PROPERTIES FIXTURES_REQUIRED example_${folder})
   add_test(NAME example_${folder}_json COMMAND $<TARGET_FILE:vdi_tool> check "${examplesFolder}/${folder}/vdi.json")
   vdi_test_properties(example_${folder}_json TIMEOUT 20 LABELS paraview)
 endfunction()
 
-set(arguments_p4est_octree 4) # smaller, for the test's time
 get_property(examples GLOBAL PROPERTY VDI_EXAMPLES)
 foreach(example IN LISTS examples)
   get_property(package GLOBAL PROPERTY VDI_EXAMPLE_MISSES_${example})
@@ -34,7 +36,7 @@ foreach(example IN LISTS examples)
     vdi_test_properties(example_${example} TIMEOUT 20 LABELS paraview)
     set_tests_properties(example_${example} PROPERTIES SKIP_REGULAR_EXPRESSION "skipped: ")
   elseif(VDI_BUILD_PYTHON)
-    vdi_add_example_test(${example} $<TARGET_FILE:${program}> ${arguments_${example}})
+    vdi_add_example_test(${example} $<TARGET_FILE:${program}>)
   endif()
 endforeach()
 if(VDI_BUILD_PYTHON)
