@@ -2,11 +2,12 @@
  * script, the cells along each axis, the layouts' names, which are the arrays' names too, separated by
  * commas, and the number of steps. Each rank has a part, which MPI_Dims_create determines. All
  * bytes that belong to no value are NaN. Odd ranks lack the array "partial", and have one of
- * another name instead of "elsewhere". If the first name is "star_mirror" or "star_periodic",
- * blocks have a ghost layer on all sides, also beyond the domain, and those at edges and corners
- * are NaN, as in PETSc's DMDA with a star stencil. The process takes the same memory for each
- * layout, which shows how much the adaptor takes. It prints the bytes of the field. Exit status 0
- * if all went well. */
+ * another name instead of "elsewhere". If the first name begins with "star_mirror" or
+ * "star_periodic", blocks have a ghost layer on all sides, also beyond the domain. Only the layers
+ * straight beyond the domain's faces have values. Those between blocks, and those at edges and
+ * corners, which PETSc's DMDA leaves unset with a star stencil, hold 1e30 if the name ends in
+ * "_huge", 0 if it ends in "_zero", and otherwise NaN. The process takes the same memory for each layout, which shows how much
+ * the adaptor takes. It prints the bytes of the field. Exit status 0 if all went well. */
 #include <math.h>
 #include <mpi.h>
 #include <stdio.h>
@@ -95,6 +96,12 @@ static void store(const array* a, const int32_t* at, double value) {
   if (a->type == VDI_CATALYST_I64) memcpy(to, &i64, sizeof i64);
 }
 
+/* What the layout's ghost layers hold that nobody sets. */
+static double garbage_of(const char* name) {
+  if (strstr(name, "_huge") != NULL) return 1e30;
+  return strstr(name, "_zero") != NULL ? 0.0 : NAN;
+}
+
 /* The index of the cell whose value a cell of the ghost layer beyond the domain has, or `index` itself. */
 static int32_t source_of(int32_t index, int n, int is_periodic) {
   if (index >= 0 && index < n) return index;
@@ -145,16 +152,21 @@ static part part_of(int rank, int ranks, int n, const char* layout) {
   return own;
 }
 
-/* The field's value in a cell, unless the cell lies at an edge or a corner of the ghost layer. */
+/* The field's value in a cell. Cells of the ghost layer have it only straight beyond the domain's faces. */
 static void simulate_cell(const part* own, const array* a, const int32_t* at, double t) {
   double place[3];
   int outside = 0;
+  int is_between = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    outside += at[axis] < own->ghosts || at[axis] >= own->cells[axis] - own->ghosts;
-    const int32_t source = source_of(own->first[axis] + at[axis], own->n, own->is_periodic);
+    const int32_t index = own->first[axis] + at[axis];
+    const int is_ghost = at[axis] < own->ghosts || at[axis] >= own->cells[axis] - own->ghosts;
+    outside += is_ghost;
+    is_between = is_between || (is_ghost && index >= 0 && index < own->n);
+    const int32_t source = source_of(index, own->n, own->is_periodic);
     place[axis] = (source + 0.5 + a->offset[axis]) * (1.0 / own->n);
   }
-  if (outside <= 1) store(a, at, field(place[0], place[1], place[2], t));
+  const int is_set = outside == 0 || (outside == 1 && !is_between);
+  store(a, at, is_set ? field(place[0], place[1], place[2], t) : garbage_of(a->name));
 }
 
 static void simulate(const part* own, const array* a, double t) {
