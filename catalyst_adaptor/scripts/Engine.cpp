@@ -24,7 +24,9 @@
 #include <cassert>
 #include <chrono>
 #include <cstdio>
+#include <cstring>
 #include <exception>
+#include <new>
 #include <regex>
 #include <stdexcept>
 #include <string_view>
@@ -65,31 +67,52 @@ class Log {
   /// Silences VTK's log on standard error again: ParaView sets its verbosity when it starts.
   static void silenceOtherOutput() { vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF); }
 
-  /// The first error since the last call; "" if there was none.
-  std::string takeFirstError() { return std::exchange(firstError_, {}); }
+  void forgetErrors() noexcept {
+    firstError_.clear();
+    isErrorLost_ = false;
+  }
+
+  /// The first error since the last call; "" if there was none. Throws std::bad_alloc if there was no memory
+  /// for its text.
+  std::string takeFirstError() {
+    if (std::exchange(isErrorLost_, false)) throw std::bad_alloc();
+    return std::exchange(firstError_, {});
+  }
 
  private:
   static constexpr const char* id = "vdi_catalyst";
 
-  static void onMessage(void* user, const vtkLogger::Message& message) {
+  /// Lets no exception out: it would pass through ParaView's engine, which then refuses all further steps.
+  static void onMessage(void* user, const vtkLogger::Message& message) noexcept {
     auto& self = *static_cast<Log*>(user);
-    const std::string text = message.message;
     if (message.verbosity <= vtkLogger::VERBOSITY_ERROR) {
-      if (text.find(harmless) != std::string::npos || !self.firstError_.empty()) return;
-      // Removes an object's address, which tells a user nothing. Some texts start on the next line.
-      static const std::regex address(R"( \((0x[0-9a-f]+|nullptr)\):\s*)");
-      self.firstError_ = std::regex_replace(text, address, ": ", std::regex_constants::format_first_only);
-      while (!self.firstError_.empty() && self.firstError_.back() == '\n') self.firstError_.pop_back();
+      const bool hasError = self.isErrorLost_ || !self.firstError_.empty();
+      if (hasError || std::strstr(message.message, harmless) != nullptr) return;
+      try {
+        self.keep(message.message);
+      } catch (...) {
+        self.firstError_.clear();
+        self.isErrorLost_ = true;
+      }
       return;
     }
     auto* controller = vtkMultiProcessController::GetGlobalController();
     // other ranks would print the same
     if (controller != nullptr && controller->GetLocalProcessId() > 0) return;
-    std::fprintf(stderr, "%s%s%s%s\n", message.preamble, message.indentation, message.prefix, text.c_str());
+    std::fprintf(stderr, "%s%s%s%s\n", message.preamble, message.indentation, message.prefix,
+                 message.message);
+  }
+
+  void keep(const char* text) {
+    // Removes an object's address, which tells a user nothing. Some texts start on the next line.
+    static const std::regex address(R"( \((0x[0-9a-f]+|nullptr)\):\s*)");
+    firstError_ = std::regex_replace(text, address, ": ", std::regex_constants::format_first_only);
+    while (!firstError_.empty() && firstError_.back() == '\n') firstError_.pop_back();
   }
 
   vtkLogger::Verbosity before_;
   std::string firstError_;
+  bool isErrorLost_ = false;
 };
 
 /// A Python pipeline that never fails for the engine, because the engine drops a pipeline that has failed
@@ -477,7 +500,7 @@ std::vector<MadeFrame> Engine::takeFrames() {
 }
 
 std::optional<std::string> Engine::finish() {
-  state_->log->takeFirstError();
+  state_->log->forgetErrors();
   bool good = true;
   for (const auto& pipeline : state_->pipelines) good = pipeline->Finalize() && good;
   state_->agreement->leaveStep();
@@ -486,7 +509,7 @@ std::optional<std::string> Engine::finish() {
 
 std::optional<std::string> Engine::execute(vtkDataObject* grid, int step, double time) {
   using Helper = vtkInSituInitializationHelper;
-  state_->log->takeFirstError();
+  state_->log->forgetErrors();
   state_->frames.clear();
   std::exception_ptr failure;
   bool good = true;
