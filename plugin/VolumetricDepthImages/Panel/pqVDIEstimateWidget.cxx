@@ -5,6 +5,7 @@
 #include <vtkCommand.h>
 #include <vtkSMProperty.h>
 #include <vtkSMProxy.h>
+#include <vtkSMSession.h>
 #include <QLabel>
 #include <QLocale>
 #include <QVBoxLayout>
@@ -77,6 +78,10 @@ pqVDIEstimateWidget::pqVDIEstimateWidget(vtkSMProxy* proxy, vtkSMProperty*, QWid
 pqVDIEstimateWidget::~pqVDIEstimateWidget() = default;
 
 void pqVDIEstimateWidget::estimate() {
+  if (this->proxy()->GetSession()->GetPendingProgress()) {  // as in pqVDIRegenerator::isUpdating
+    this->Soon.start();
+    return;
+  }
   auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(this->proxy());
   const std::optional<vdi::VdiEstimate> estimate =
       generator != nullptr ? generator->EstimateToCome() : std::nullopt;

@@ -5,6 +5,7 @@
 #include <pqApplicationCore.h>
 #include <pqCoreUtilities.h>
 #include <pqPipelineSource.h>
+#include <pqServer.h>
 #include <pqServerManagerModel.h>
 #include <pqUndoStack.h>
 #include <pqView.h>
@@ -119,6 +120,12 @@ bool pqVDIRegenerator::isUsed() const {
                      [this](pqView* view) { return pv::showsResultOf(view, this->Source); });
 }
 
+/// Whether ParaView's server works for the window. ParaView's progress bar lets timers run meanwhile, but the
+/// filter may be in the middle of an update, which must not begin again.
+bool pqVDIRegenerator::isUpdating() const {
+  return this->Source->getServer()->isProgressPending();
+}
+
 bool pqVDIRegenerator::isShownIn(pqView* view) const {
   return pv::shows(view, this->Source);
 }
@@ -231,6 +238,7 @@ void pqVDIRegenerator::mapChanged() {
 }
 
 void pqVDIRegenerator::look() {
+  if (this->isUpdating()) return;
   if (QApplication::mouseButtons() != Qt::NoButton) {
     this->Resting.start();
     return;
@@ -319,6 +327,7 @@ void pqVDIRegenerator::leaveToUser() {
 }
 
 void pqVDIRegenerator::lookAtViews() {
+  if (this->isUpdating()) return;
   vtkSMVDIGeneratorProxy* own = this->generator();
   if (vtkSMPropertyHelper(own, "Auto").GetAsInt() == 0 || this->Now != State::Idle ||
       this->Source->modifiedState() == pqProxy::UNINITIALIZED)

@@ -66,6 +66,7 @@ class pqVDIRegenerator : public QObject {
   enum class State { Idle, Waiting, Preparing };
 
   vtkSMVDIGeneratorProxy* generator() const;
+  bool isUpdating() const;
   bool isUsed() const;
   bool isShownIn(pqView* view) const;
   QList<pqView*> comparativeViews() const;

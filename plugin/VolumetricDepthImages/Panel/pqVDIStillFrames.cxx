@@ -1,6 +1,7 @@
 #include "pqVDIStillFrames.h"
 
 #include <pqApplicationCore.h>
+#include <pqServer.h>
 #include <pqServerManagerModel.h>
 #include <pqView.h>
 #include <vtkPVRenderView.h>
@@ -103,6 +104,9 @@ void pqVDIStillFrames::rendered() {
 void pqVDIStillFrames::look() {
   const QList<QPointer<pqView>> views = this->Behind;
   for (const QPointer<pqView>& view : views) {
+    // During an update, ParaView's progress bar lets timers run. A frame would then request a VDI from
+    // within the update that makes it.
+    if (view != nullptr && view->getServer()->isProgressPending()) continue;
     if (view != nullptr && isBehind(view)) {
       if (hasMore(view)) view->forceRender();
     } else {
