@@ -29,7 +29,7 @@ program fortran_simulation
   if (len(vdi_catalyst_error(catalyst)) /= 0) call mpi_abort(mpi_comm_world, 2, error)
   if (vdi_catalyst_execute(catalyst, -1_c_int64_t, 0.0_c_double) /= vdi_catalyst_bad_argument) &
     call mpi_abort(mpi_comm_world, 3, error)
-  if (index(vdi_catalyst_error(catalyst), "step -1 isn't") == 0) call mpi_abort(mpi_comm_world, 4, error)
+  if (index(vdi_catalyst_error(catalyst), "step -1 is refused") == 0) call mpi_abort(mpi_comm_world, 4, error)
   if (abs(vdi_catalyst_parameter_f64(catalyst, "feed" // c_null_char, 0.037_c_double, 0.0_c_double, 0.1_c_double) - &
     0.037_c_double) > 0) call mpi_abort(mpi_comm_world, 6, error)
   if (vdi_catalyst_parameter_i64(catalyst, "waves" // c_null_char, 3_c_int64_t, 1_c_int64_t, 9_c_int64_t) /= 3_c_int64_t) &
