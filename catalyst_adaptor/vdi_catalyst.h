@@ -46,9 +46,9 @@
  *
  * The following events still end the process, because ParaView, Python or a library leaves no
  * choice: a script that calls os._exit or os.abort, or crashes in one of its modules; an allocation
- * of ParaView's own that fails (Debian's VTK aborts); an X server that goes away while a view is
- * drawn (Xlib exits); a view that is drawn without a display by methods of its render window or
- * SMProxy instead of paraview.simple; a crash of a driver.
+ * that fails in ParaView, or in a filter or writer that ParaView calls (Debian's VTK aborts); an X
+ * server that goes away while a view is drawn (Xlib exits); a view that is drawn without a display
+ * by methods of its render window or SMProxy instead of paraview.simple; a crash of a driver.
  *
  * None of these events ends the process if frames are made in processes of their own: by "isolation" in a
  * JSON text, or by VDI_ISOLATION=process in the first rank's environment. Then vdi_catalyst_execute copies
