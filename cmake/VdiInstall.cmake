@@ -117,3 +117,4 @@ install(FILES catalyst_adaptor/vdi_catalyst.h catalyst_adaptor/vdi_catalyst.f90
 install(DIRECTORY catalyst_adaptor/examples DESTINATION "${CMAKE_INSTALL_DOCDIR}/catalyst_adaptor"
         PATTERN CMakeLists.txt EXCLUDE)
 install(DIRECTORY tests/install/project DESTINATION "${CMAKE_INSTALL_DOCDIR}/tests/install")
+install(FILES tests/README.md DESTINATION "${CMAKE_INSTALL_DOCDIR}/tests")
