@@ -6,8 +6,9 @@
  * "star_periodic", blocks have a ghost layer on all sides, also beyond the domain. Only the layers
  * straight beyond the domain's faces have values. Those between blocks, and those at edges and
  * corners, which PETSc's DMDA leaves unset with a star stencil, hold 1e30 if the name ends in
- * "_huge", 0 if it ends in "_zero", and otherwise NaN. The process takes the same memory for each layout, which shows how much
- * the adaptor takes. It prints the bytes of the field. Exit status 0 if all went well. */
+ * "_huge", 0 if it ends in "_zero", and otherwise NaN. The process takes the same memory for each
+ * layout, which shows how much the adaptor takes. It prints the bytes of the field. Exit status 0 if
+ * all went well. */
 #include <math.h>
 #include <mpi.h>
 #include <stdio.h>
