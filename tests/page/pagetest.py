@@ -122,7 +122,7 @@ def azimuth(camera, degrees):
     back = np.array(camera["position"]) - focal
     angle = math.radians(degrees)
     turned = math.cos(angle) * back + math.sin(angle) * np.cross(up, back) + (1 - math.cos(angle)) * (up @ back) * up
-    return {**camera, "position": list(focal + turned)}
+    return {**camera, "position": (focal + turned).tolist()}
 
 
 def camera_of(browser):
