@@ -2,6 +2,7 @@
 #ifndef VDIFileState_h
 #define VDIFileState_h
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
