@@ -14,6 +14,10 @@ sample, state = sys.argv[1:]
 grid = OpenDataFile(sample, registrationName="grid")  # the simulation's blocks have this name
 image = VolumetricDepthImage(Input=grid)
 image.SelectInputScalars = ["CELLS", "V"]
+image.LookupTable = GetColorTransferFunction("V")
+image.ScalarOpacityFunction = GetOpacityTransferFunction("V")
+for function in (image.LookupTable, image.ScalarOpacityFunction):
+    function.RescaleTransferFunction(0.0, 0.45)  # V's range in the whole run
 image.Resolution = [640, 360]
 image.UpdatePipeline()
 

@@ -11,7 +11,12 @@ is_simulating = world.rank < world.size - 1
 part = world.Split(color=int(is_simulating), key=world.rank)
 
 if is_simulating:
-    run = {"field": "V", "resolution": [640, 360], "output": "part_{timestep:06d}.vdi"}
+    run = {
+        "field": "V",
+        "colors": {"range": [0, 1]},  # V's range in the whole run
+        "resolution": [640, 360],
+        "output": "part_{timestep:06d}.vdi",
+    }
     with Catalyst(part, json=run) as catalyst:
         block = Block(cells=(N, N, N), origin=(part.rank, 0, 0), spacing=(1 / N,) * 3)
         catalyst.set_blocks([block])
