@@ -14,7 +14,7 @@ for package in paraview python3-paraview 'libopenmpi[0-9]*' libvulkan1 'mesa-vul
 done
 dpkg-deb -x pv-vdi_*.deb root
 for file in usr/bin/{vdi,paraview.conf} usr/include/pv-vdi/vdi_catalyst.{h,f90} usr/share/doc/pv-vdi/copyright \
-  "$libraries"/{libvdi_catalyst.so,libpv-vdi.so,pv-vdi/libvdi_catalyst_{engine,isolated}.so,pv-vdi/vdi_catalyst_process,pkgconfig/pv-vdi.pc} \
+  "$libraries"/{libvdi_catalyst.so,libpv-vdi.so,pv-vdi/libvdi_catalyst_{engine,isolated,json}.so,pv-vdi/vdi_catalyst_process,pkgconfig/pv-vdi.pc} \
   "usr/bin/$(cat root/usr/bin/paraview.conf)"; do
   [ -e "root/$file" ] || { echo "FAILED: it has no $file"; exit 1; }
 done
