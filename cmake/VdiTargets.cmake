@@ -7,9 +7,17 @@ if(CMAKE_UNITY_BUILD)
   set(VDI_UNITY_OPTIONS "$<$<COMPILE_LANGUAGE:CXX>:-Wno-subobject-linkage>")
 endif()
 
+# GCC 10 warns of each memcpy to a struct whose members have default values. Newer ones warn only of
+# structs that aren't trivially copyable.
+set(VDI_COMPILER_OPTIONS "")
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 11)
+  set(VDI_COMPILER_OPTIONS "$<$<COMPILE_LANGUAGE:CXX>:-Wno-class-memaccess>")
+endif()
+
 # Adds warnings and sanitizers to a target of this project.
 function(vdi_target_options target)
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow ${VDI_UNITY_OPTIONS})
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow ${VDI_COMPILER_OPTIONS}
+                                           ${VDI_UNITY_OPTIONS})
   target_include_directories(${target} PUBLIC "$<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}>")
   if(VDI_SANITIZE)
     # AddressSanitizer finds null pointers and ends of objects, too. Checking them twice slows the compiler down.
