@@ -290,7 +290,6 @@ printf '{"field": "V",\n"when": {"max": "V"}}' >run.json
 refused 1 "/when: must have a bound, 'above' or 'below' .run.json, line 2." "$vdi" check run.json
 refused 1 "not a run's log .*odd.json" "$vdi" log odd.json
 refused 2 "would overwrite" "$vdi" log odd.json -o odd.json
-mkfifo pipe.json
 refused 1 "pipe.json" timeout 10 "$vdi" check pipe.json
 refused 1 "none.json" "$vdi" check '{"field": "V", "colors": {"file": "none.json"}}'
 
@@ -321,8 +320,11 @@ refused 2 "VDI_VALIDATION is 'yes'; it may be 0 or 1" env VDI_VALIDATION=yes "$v
   -o x.vdi
 refused 2 "VDI_RANKS_PER_HOST is '-1'; it may be a whole number" "${mpirun[@]}" 1 env VDI_RANKS_PER_HOST=-1 "$vdi" \
   generate --field sphere "${small[@]}" -o x.vdi
-refused 2 "VDI_RANKS_PER_HOST is 'two'; it may be a whole number" "${mpirun[@]}" 1 "$vdi" generate --field sphere \
-  "${small[@]}" -o x.vdi : -n 1 env VDI_RANKS_PER_HOST=two "$vdi" generate --field sphere "${small[@]}" -o x.vdi
+# The second rank's environment is bad. Open MPI 5.0.7 crashes where each rank is given its own program.
+# shellcheck disable=SC2016  # each rank's shell expands these
+refused 2 "VDI_RANKS_PER_HOST is 'two'; it may be a whole number" "${mpirun[@]}" 2 sh -c \
+  '[ "$OMPI_COMM_WORLD_RANK" = 0 ] || export VDI_RANKS_PER_HOST=two; exec "$@"' sh \
+  "$vdi" generate --field sphere "${small[@]}" -o x.vdi
 # A cache only saves time.
 touch file
 for cache in /proc/nope "$folder/file"; do
