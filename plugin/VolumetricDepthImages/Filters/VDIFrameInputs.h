@@ -9,9 +9,9 @@
 namespace pv {
 
 struct FrameInputs {
-  vdi::Camera Camera;
-  vdi::TransferFunction Function;
-  vdi::GenerateSettings Settings;
+  vdi::Camera camera;
+  vdi::TransferFunction function;
+  vdi::GenerateSettings settings;
 };
 
 }  // namespace pv

@@ -45,7 +45,7 @@ Preparation::Make makerOf(FrameInputs frame, std::optional<Load> load, const Ori
     }
     reports = {};
     vdi::VdiGenerator& generator = volume.generator();
-    std::optional<vdi::Vdi> vdi = generator.generate(frame.Camera, frame.Function, frame.Settings, progress);
+    std::optional<vdi::Vdi> vdi = generator.generate(frame.camera, frame.function, frame.settings, progress);
     reports = reportsOf(generator);
     if (!vdi) return;  // another rank has it
     giveVdi(*vdi, *volume.shown(), origin, step, output);

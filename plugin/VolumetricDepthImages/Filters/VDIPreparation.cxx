@@ -10,55 +10,55 @@
 namespace pv {
 
 Preparation::Preparation(std::shared_ptr<Volume> volume, vtkMTimeType time, Make make)
-    : Of(std::move(volume)),
-      Mine(*Of),
-      Time(time),
-      Worker([this, given = std::move(make)] { this->work(given); }) {}
+    : volume_(std::move(volume)),
+      turn_(*volume_),
+      time_(time),
+      thread_([this, given = std::move(make)] { work(given); }) {}
 
 Preparation::~Preparation() {
-  this->giveUp();
-  while (this->hasRanks() && !this->Done) this->serve(std::chrono::milliseconds(10));
+  giveUp();
+  while (hasRanks() && !isDone_) serve(std::chrono::milliseconds(10));
 }
 
 void Preparation::work(const Make& make) {
   // Either all ranks begin or none does.
-  const auto isInVain = [this] { return this->Unwanted && !this->hasRanks(); };
-  if (this->Mine.awaitUnless(isInVain)) {
+  const auto isInVain = [this] { return isUnwanted_ && !hasRanks(); };
+  if (turn_.awaitUnless(isInVain)) {
     std::optional<vdi::comm::Funnel::Entry> carried;
-    if (this->hasRanks()) carried.emplace(this->Of->funnel());
+    if (hasRanks()) carried.emplace(volume_->funnel());
     try {
       make(
-          *this->Of,
+          *volume_,
           [this](double done) {
-            this->Share = done;
-            return !this->Unwanted;
+            share_ = done;
+            return !isUnwanted_;
           },
-          this->Output);
-      this->Good = true;
+          output_);
+      isGood_ = true;
     } catch (const std::exception&) {
-      this->Good = false;  // the update tries again, and reports the reason if it fails, too
+      isGood_ = false;  // the update tries again, and reports the reason if it fails, too
     }
   }
-  this->Mine.end();
-  this->Done = true;
+  turn_.end();
+  isDone_ = true;
 }
 
 int Preparation::percent() const {
-  if (this->Done) return this->Good ? 100 : -1;
-  return std::clamp(static_cast<int>(100.0 * this->Share), 0, 99);
+  if (isDone_) return isGood_ ? 100 : -1;
+  return std::clamp(static_cast<int>(100.0 * share_), 0, 99);
 }
 
 Preparation::End Preparation::wait(const std::function<void()>& whileWaiting) {
-  while (!this->Done) {
-    if (this->hasRanks()) {
-      this->serve(std::chrono::milliseconds(10));
+  while (!isDone_) {
+    if (hasRanks()) {
+      serve(std::chrono::milliseconds(10));
     } else {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     whileWaiting();
   }
-  if (onAllRanks(this->Of->controller(), this->Good)) return End::Good;
-  return onAllRanks(this->Of->controller(), !this->Unwanted) ? End::Failed : End::GivenUp;
+  if (onAllRanks(volume_->controller(), isGood_)) return End::Good;
+  return onAllRanks(volume_->controller(), !isUnwanted_) ? End::Failed : End::GivenUp;
 }
 
 }  // namespace pv

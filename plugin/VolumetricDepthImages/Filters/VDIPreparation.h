@@ -36,40 +36,40 @@ class Preparation {
   Preparation(Preparation&&) = delete;
   Preparation& operator=(Preparation&&) = delete;
 
-  vtkMTimeType time() const { return Time; }
-  void setTime(vtkMTimeType time) { Time = time; }
-  bool hasRanks() const { return Of->hasRanks(); }
+  vtkMTimeType time() const { return time_; }
+  void setTime(vtkMTimeType time) { time_ = time; }
+  bool hasRanks() const { return volume_->hasRanks(); }
   /// Whether this rank's thread has nothing left to do.
-  bool isDone() const { return Done; }
+  bool isDone() const { return isDone_; }
   /// The progress in percent: 100 once the VDI is ready, -1 after it was given up or failed.
   int percent() const;
   /// Asks the thread to stop. The thread checks this once a band. One rank's call is enough.
-  void giveUp() { Unwanted = true; }
-  bool isGivenUp() const { return Unwanted; }
+  void giveUp() { isUnwanted_ = true; }
+  bool isGivenUp() const { return isUnwanted_; }
   /// With several ranks: carries out the collective operations of the ranks' threads, in this turn and in
   /// those before it. Doesn't wait for other ranks.
-  void serve(std::chrono::milliseconds most) { Of->serve(most); }
+  void serve(std::chrono::milliseconds most) { volume_->serve(most); }
 
   enum class End { Good, GivenUp, Failed };
   /// Collective: waits for the end, which is the same on all ranks. Calls `whileWaiting` now and then.
   End wait(const std::function<void()>& whileWaiting);
   /// `output` and `share` are valid once `wait` has returned End::Good.
-  vtkVDIImageData* output() { return Output; }
-  double share() const { return Share; }
+  vtkVDIImageData* output() { return output_; }
+  double share() const { return share_; }
 
  private:
   void work(const Make& make);
 
-  std::shared_ptr<Volume> Of;
-  Turn Mine;
-  vtkMTimeType Time;
-  std::atomic<double> Share{0.0};
-  std::atomic<bool> Unwanted{false};
-  std::atomic<bool> Done{false};
-  vtkNew<vtkVDIImageData> Output;  // belongs to the thread until Done
-  bool Good = false;               // belongs to the thread until Done
+  std::shared_ptr<Volume> volume_;
+  Turn turn_;
+  vtkMTimeType time_;
+  std::atomic<double> share_{0.0};
+  std::atomic<bool> isUnwanted_{false};
+  std::atomic<bool> isDone_{false};
+  vtkNew<vtkVDIImageData> output_;  // belongs to the thread until isDone_
+  bool isGood_ = false;             // belongs to the thread until isDone_
   // last member, so that the thread is joined before the others are destroyed
-  std::jthread Worker;
+  std::jthread thread_;
 };
 
 }  // namespace pv

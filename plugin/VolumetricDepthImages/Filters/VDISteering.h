@@ -19,21 +19,21 @@ namespace pv {
 class Steering {
  public:
   /// Whether the period requires a VDI for this step. Call it once for each step.
-  bool IsDue();
+  bool isDue();
   /// Call it after a step's VDI has been published. It takes the viewers' wishes and applies them on all
   /// ranks; they are in force from the next step on. While viewers pause the simulation, it waits here, and
   /// makes the step's VDI again when a viewer changes it. Collective over the clients. Throws vdi::Error:
   /// RemoteRank if another rank doesn't take part, InvalidArgument if server and client are different
   /// processes, Io for the log.
-  void Meet(vtkSMSourceProxy* writer, vtkSMExtractsController* extractor);
+  void meet(vtkSMSourceProxy* writer, vtkSMExtractsController* extractor);
 
  private:
-  void Apply(const vdi::stream::Wish& wish, vtkSMProxy* generator);
-  void Tell(vtkVDIStreamWriter* server, vtkSMProxy* generator) const;
+  void apply(const vdi::stream::Wish& wish, vtkSMProxy* generator);
+  void tell(vtkVDIStreamWriter* server, vtkSMProxy* generator) const;
 
-  int Period = 1;
-  int SinceLast = 0;  // number of steps since the last VDI
-  bool IsPaused = false;
+  int period_ = 1;
+  int sinceLast_ = 0;  // number of steps since the last VDI
+  bool isPaused_ = false;
 };
 
 }  // namespace pv

@@ -22,10 +22,10 @@ bool vtkSMVDIStreamExtractWriterProxy::Write(vtkSMExtractsController* extractor)
   vtkSMPropertyHelper(writer, "TimeStep").Set(extractor->GetTimeStep());
   writer->UpdateVTKObjects();
   const bool isSteered = vtkSMPropertyHelper(writer, "Steer").GetAsInt() != 0;
-  if (!isSteered || this->Steering->IsDue()) writer->UpdatePipeline(extractor->GetTime());
+  if (!isSteered || this->Steering->isDue()) writer->UpdatePipeline(extractor->GetTime());
   if (!isSteered) return true;
   try {
-    this->Steering->Meet(writer, extractor);
+    this->Steering->meet(writer, extractor);
   } catch (const std::exception& error) {
     vtkErrorMacro(<< error.what());
     return false;

@@ -14,12 +14,14 @@
 
 #include <array>
 #include <chrono>
+#include <cstdint>
 #include <exception>
 #include <functional>
 #include <new>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "VDIDefaultRange.h"
 #include "VDIFailure.h"
@@ -352,16 +354,18 @@ pv::Origin vtkVDIGenerator::OriginOf(vtkDataObject* input) {
 void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const pv::Origin& origin) {
   pv::Volume& volume = *this->Internal->Use.volume();
   const vdi::comm::Communicator& comm = volume.generator().communicator();
-  comm.together([&] { pv::requireInput(input); });
   // The ranks' next steps depend on these values. The generator compares the others.
-  comm.requireEqual(std::hash<std::string>()(origin.choice.name), "SelectInputScalars, the array");
-  comm.requireEqual(origin.choice.cells ? 1U : 0U, "SelectInputScalars, of points or of cells");
-  comm.requireEqual(static_cast<std::uint64_t>(std::int64_t{this->Component}), "Component");
-  comm.requireEqual(this->FillGhosts ? 1U : 0U, "FillGhosts");
-  comm.requireEqual(this->PictureOnly ? 1U : 0U, "PictureOnly");
-  comm.requireEqual(static_cast<std::uint64_t>(this->BlendMode), "BlendMode");
-  // Rejects the blend mode before any values are loaded.
-  comm.together([&] { static_cast<void>(this->CurrentBlending()); });
+  comm.requireEqual([&] {
+    pv::requireInput(input);
+    static_cast<void>(this->CurrentBlending());  // rejects the blend mode before any values are loaded
+    return std::vector<vdi::comm::Communicator::Fingerprint>{
+        {std::hash<std::string>()(origin.choice.name), "SelectInputScalars, the array"},
+        {origin.choice.cells ? 1U : 0U, "SelectInputScalars, of points or of cells"},
+        {static_cast<std::uint64_t>(std::int64_t{this->Component}), "Component"},
+        {this->FillGhosts ? 1U : 0U, "FillGhosts"},
+        {this->PictureOnly ? 1U : 0U, "PictureOnly"},
+        {static_cast<std::uint64_t>(this->BlendMode), "BlendMode"}};
+  });
   if (!comm.anyTogether([&] { return this->Internal->Use.shownOf(origin) == nullptr; })) return;
   pv::Load load;
   comm.together([&] { load = pv::loadOf(input, this->GetInputAlgorithm(0, 0), origin); });

@@ -141,11 +141,10 @@ pv::FrameInputs vtkVDIProperties::CurrentFrame(const vdi::Box& bounds, double vo
                                                const vdi::ScalarRange& range) {
   double unit = this->ScalarOpacityUnitDistance;
   if (unit <= 0.0) unit = vdi::unitDistanceOf(bounds, voxelVolume);
-  pv::FrameInputs frame{.Camera = this->Viewpoint(bounds),
-                        .Function = pv::transferFunctionOf(this->LookupTable, this->ScalarOpacityFunction,
-                                                           range.min, range.max, unit),
-                        .Settings = this->CurrentSettings()};
-  return frame;
+  return {.camera = this->Viewpoint(bounds),
+          .function = pv::transferFunctionOf(this->LookupTable, this->ScalarOpacityFunction, range.min,
+                                             range.max, unit),
+          .settings = this->CurrentSettings()};
 }
 
 vdi::GenerateSettings vtkVDIProperties::CurrentSettings() const {
