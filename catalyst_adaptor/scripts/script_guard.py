@@ -189,7 +189,7 @@ class Loading:
     """The script that is being loaded, and what the loaded ones have made."""
 
     def __init__(self):
-        self.proxies = None  # those before the script that is being loaded
+        self.proxies = None  # the proxies that existed before this script was loaded
         self.folders = {}  # folders of extracts, by module's name
         self.owners = {}  # modules' names, by extractor
 
@@ -216,6 +216,14 @@ class Loading:
         return self.folders.get(self.owners.get(extractor.SMProxy, ""), "")
 
 
+class Missed:
+    """The steps that were handed over before the first one that an extractor takes."""
+
+    count = 0
+    last = None
+    is_over = False  # it has taken one, or a warning was given
+
+
 class Extracts:
     """Prepares the files of a step before the engine writes them."""
 
@@ -224,15 +232,40 @@ class Extracts:
         self.leave = leave
         self.last_files = {}  # by extractor
         self.told_of = set()  # extractors that replace an earlier run's files
+        self.missed = {}  # by extractor
 
     def prepare(self, module):
-        due = self.leave_out_same_files(due_extractors())
+        due = due_extractors()
+        self.tell_of_missed_steps(due)
+        due = self.leave_out_same_files(due)
         if due:
             make_folder(self.loading.folders.get(module.__name__, ""))
             self.tell_of_older_files(due)
         drawn = [extractor for extractor in due if draws(extractor)]
         if self.leave(not all([has_display(extractor) for extractor in drawn])):
             leave_out(drawn)
+
+    def tell_of_missed_steps(self, due):
+        """Reports, once for each extractor, that the simulation hands over none of the step numbers that its trigger takes.
+        As many consecutive steps as the trigger's frequency would include one."""
+        from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
+        from vtkmodules.vtkCommonCore import vtkLogger
+        step = helper.GetTimeStep()
+        taking = {extractor.SMProxy.GetGlobalID() for extractor in due}
+        for extractor in enabled_extractors():
+            trigger, key = extractor.Trigger, extractor.SMProxy.GetGlobalID()
+            missed = self.missed.setdefault(key, Missed())
+            if key in taking or trigger is None or trigger.GetXMLName() != "TimeStep":
+                missed.is_over = True
+            if missed.is_over or step == missed.last or not is_between(trigger, step):
+                continue
+            missed.last = step
+            missed.count += 1
+            if missed.count == trigger.Frequency:
+                missed.is_over = True
+                vtkLogger.Log(vtkLogger.VERBOSITY_WARNING, "script", 0, "the extractor of '%s' has written nothing in %d "
+                              "steps: its trigger's frequency counts step numbers, and the simulation handed over none of %s"
+                              % (extractor.Writer.FileName, missed.count, steps_of(trigger)))
 
     def leave_out_same_files(self, due):
         """Returns the extractors without those that would replace another one's file in this step; reports and disables
@@ -335,8 +368,27 @@ def due_extractors(step=None, time=None):
         # Other triggers count how often they are asked.
         return trigger is None or trigger.GetXMLName() != "TimeStep" or controller.IsTriggerActivated(extractor.SMProxy)
 
+    return [extractor for extractor in enabled_extractors() if due(extractor)]
+
+
+def enabled_extractors():
+    from paraview import servermanager
     extractors = servermanager.ProxyManager().GetProxiesInGroup("extractors").values()
-    return [extractor for extractor in extractors if controller.IsExtractorEnabled(extractor.SMProxy) and due(extractor)]
+    return [extractor for extractor in extractors
+            if servermanager.vtkSMExtractsController.IsExtractorEnabled(extractor.SMProxy)]
+
+
+def is_between(trigger, step):
+    """Whether a step isn't before the trigger's first one or after its last one."""
+    is_early = trigger.UseStartTimeStep and step < trigger.StartTimeStep
+    is_late = trigger.UseEndTimeStep and step > trigger.EndTimeStep
+    return not is_early and not is_late
+
+
+def steps_of(trigger):
+    """The first step numbers that a trigger takes, as text."""
+    first = trigger.StartTimeStep if trigger.UseStartTimeStep else 0
+    return ", ".join(str(first + i * trigger.Frequency) for i in range(3)) + ", ..."
 
 
 def draws(extractor):

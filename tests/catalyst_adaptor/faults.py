@@ -19,7 +19,7 @@ image.SelectInputScalars = ["CELLS" if FAULT == "cells" else "POINTS", "V"]
 image.Resolution = [64, 48]
 extractor = CreateExtractor("VDI", image, registrationName="vdi")
 extractor.Writer.FileName = "vdi_{timestep:06d}.vdi"
-if FAULT == "wants":
+if FAULT in ("wants", "frequency"):
     extractor.Trigger.Frequency = 2
 if FAULT in ("view", "screenshot", "picture"):
     view = CreateView("RenderView")  # no fault: scripts that ParaView exports always do

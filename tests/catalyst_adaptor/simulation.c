@@ -3,6 +3,7 @@
  * text. Environment: VDI_TEST_INITIALIZE=CODE: initialize returns that, and nothing else happens, unless
  * VDI_TEST_THEN=SCRIPT: initialize with that script succeeds and is finalized.
  * VDI_TEST_WANTS=1010: the answers of vdi_catalyst_wants before the steps.
+ * VDI_TEST_APART=2: the steps are 1, 3, 5, ... instead of 1, 2, 3, ...
  * VDI_TEST_LATE=1: finalize is called after MPI_Finalize.
  * VDI_TEST_GROWTH=KIB: the resident memory grows by less from a quarter of the steps to the last.
  * VDI_ISOLATION: the same in processes of their own. */
@@ -96,20 +97,21 @@ static int run_steps(int rank, vdi_catalyst* catalyst, int argc, char** argv) {
   int total = 0;
   for (int i = 2; i < argc; ++i) total += strchr(argv[i], '*') != NULL ? atoi(strchr(argv[i], '*') + 1) : 1;
   const char* wanted = getenv("VDI_TEST_WANTS");
-  int step = 0;
+  const char* apart = getenv("VDI_TEST_APART");
+  int count = 0;
   long before = 0;
   for (int i = 2; i < argc; ++i) {
     for (int left = strchr(argv[i], '*') != NULL ? atoi(strchr(argv[i], '*') + 1) : 1; left > 0; --left) {
-      ++step;
+      const int step = 1 + count++ * (apart != NULL ? atoi(apart) : 1);
       simulate(rank, step);
-      if (wanted != NULL && wanted[step - 1] != '\0')
-        wrong += expect(rank, "wants", wanted[step - 1] - '0',
-                        wants_in_the_end(catalyst, step, wanted[step - 1] - '0'));
+      if (wanted != NULL && wanted[count - 1] != '\0')
+        wrong += expect(rank, "wants", wanted[count - 1] - '0',
+                        wants_in_the_end(catalyst, step, wanted[count - 1] - '0'));
       const int code = vdi_catalyst_execute(catalyst, step, 0.5 * step);
       wrong += expect_step(rank, atoi(argv[i]), code);
       const int told = vdi_catalyst_error(catalyst)[0] != '\0';
       if (code != VDI_CATALYST_OK) wrong += expect(rank, "the error's text", 1, told);
-      if (step == total / 4) before = resident_kib();
+      if (count == total / 4) before = resident_kib();
     }
   }
   const char* maximum = getenv("VDI_TEST_GROWTH");
