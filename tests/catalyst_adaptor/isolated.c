@@ -11,7 +11,6 @@
  * has a second array, "W", which the others lack. VDI_TEST_HURRY: how many times as fast the steady
  * clock runs in this process while it finalizes. */
 #define _GNU_SOURCE
-#include <dirent.h>
 #include <mpi.h>
 #include <pthread.h>
 #include <signal.h>
@@ -26,6 +25,7 @@
 
 #include "catalyst_adaptor/vdi_catalyst.h"
 #include "tests/catalyst_adaptor/expect.h"
+#include "tests/catalyst_adaptor/worker.h"
 
 static int size = 16;
 static double* now;
@@ -97,47 +97,6 @@ static void spread(void) {
   double* const old = now;
   now = next;
   next = old;
-}
-
-/* Whether a process is the worker of this simulation's rank: a worker with the same VDI_TEST_RUN. */
-static int is_mine(const char* process, int rank) {
-  char path[300];
-  static char text[1 << 20];
-  snprintf(path, sizeof path, "/proc/%s/environ", process);
-  FILE* file = fopen(path, "re");
-  if (file == NULL) return 0;
-  size_t count = fread(text, 1, sizeof text - 1, file);
-  fclose(file);
-  text[count] = '\0';
-  char run[100];
-  char own[100];
-  snprintf(run, sizeof run, "VDI_TEST_RUN=%s", getenv("VDI_TEST_RUN"));
-  snprintf(own, sizeof own, "OMPI_COMM_WORLD_RANK=%d", rank);
-  int found = 0;
-  for (const char* one = text; one < text + count; one += strlen(one) + 1)
-    found |= strcmp(one, run) == 0 ? 1 : strcmp(one, own) == 0 ? 2 : 0;
-  snprintf(path, sizeof path, "/proc/%s/cmdline", process);
-  file = fopen(path, "re");
-  if (file == NULL) return 0;
-  count = fread(text, 1, sizeof text - 1, file);
-  fclose(file);
-  text[count] = '\0';
-  const int is_worker =
-      strstr(text, "vdi_catalyst_process") != NULL && strcmp(text + strlen(text) + 1, "work") == 0;
-  int ranks = 1;
-  MPI_Comm_size(MPI_COMM_WORLD, &ranks);
-  return is_worker && found == (ranks > 1 ? 3 : 1);
-}
-
-static pid_t worker_of(int rank) {
-  DIR* folder = opendir("/proc");
-  pid_t worker = 0;
-  for (const struct dirent* entry = readdir(folder); entry != NULL; entry = readdir(folder)) {
-    if (entry->d_name[0] >= '1' && entry->d_name[0] <= '9' && is_mine(entry->d_name, rank))
-      worker = (pid_t)atoi(entry->d_name);
-  }
-  closedir(folder);
-  return worker;
 }
 
 static void* kill_soon(void* worker) {

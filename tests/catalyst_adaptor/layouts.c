@@ -97,7 +97,7 @@ static void store(const array* a, const int32_t* at, double value) {
   if (a->type == VDI_CATALYST_I64) memcpy(to, &i64, sizeof i64);
 }
 
-/* What the layout's ghost layers hold that nobody sets. */
+/* The values of ghost layers that nobody sets in this layout. */
 static double garbage_of(const char* name) {
   if (strstr(name, "_huge") != NULL) return 1e30;
   return strstr(name, "_zero") != NULL ? 0.0 : NAN;

@@ -1,8 +1,8 @@
 /* Blocks that come, go, move, and change size, spacing and rank at each step. Checks that the memory of the
- * process doesn't grow. Argument: the number of frames. In the folder VDI_OUTPUT each frame's file
- * replaces an older one. The blocks of a step are those of 20 steps before. A fifth of the frames,
- * in which memory may grow, therefore includes the largest frame. VDI_ENDURANCE_FRAMES in the
- * environment replaces the number.
+ * process that makes the frames doesn't grow, be it this one or a separate one. Argument: the number of
+ * frames. In the folder VDI_OUTPUT each frame's file replaces an older one. The blocks of a step are those of
+ * 20 steps before. A fifth of the frames, in which memory may grow, therefore includes the largest frame.
+ * VDI_ENDURANCE_FRAMES in the environment replaces the number.
  */
 #include <math.h>
 #include <mpi.h>
@@ -13,6 +13,7 @@
 
 #include "catalyst_adaptor/vdi_catalyst.h"
 #include "tests/catalyst_adaptor/expect.h"
+#include "tests/catalyst_adaptor/worker.h"
 
 enum { PERIOD = 20, SIDE = 4, COARSE = 6, FINE = 12, MAX_VALUES = FINE * FINE * FINE };
 enum { UNDER_WAY = 2 }; /* frames that separate processes may have under way */
@@ -62,6 +63,17 @@ static int place_blocks(int step, int rank, int ranks, vdi_catalyst_block* block
   return count;
 }
 
+/* The resident memory of the processes that serve this rank, in KiB. */
+static long memory(int rank) {
+  if (getenv("VDI_ISOLATION") == NULL) return resident_kib();
+  const pid_t worker = worker_of(rank);
+  if (worker == 0) {
+    fprintf(stderr, "rank %d has no worker\n", rank);
+    MPI_Abort(MPI_COMM_WORLD, 3);
+  }
+  return resident_kib() + resident_kib_of(worker);
+}
+
 int main(int argc, char** argv) {
   int rank = 0;
   int ranks = 0;
@@ -89,9 +101,9 @@ int main(int argc, char** argv) {
       snprintf(name, sizeof name, "moving_%d.vdi", step - UNDER_WAY);
       wrong += unlink(name) != 0;
     }
-    if (step == frames / 5) early = resident_kib();
+    if (step == frames / 5) early = memory(rank);
   }
-  const long late = resident_kib();
+  const long late = memory(rank);
   wrong += vdi_catalyst_finalize(catalyst) != VDI_CATALYST_OK;
   printf("rank %d: %ld KiB after a fifth of %d frames, %ld KiB after all\n", rank, early, frames, late);
   /* A leak of a hundred bytes per frame shows in 10 000 frames; fewer reveal larger leaks. */

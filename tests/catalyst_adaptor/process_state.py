@@ -1,5 +1,5 @@
 """Makes a VDI at each step, sends the simulation a signal, and changes what a script can change in the process that runs it.
-Its settings in the environment are still there at the next step."""
+The environment variables that it sets are still set at the next step."""
 
 import errno
 import locale
