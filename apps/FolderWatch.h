@@ -39,8 +39,8 @@ class FolderWatch {
   std::chrono::milliseconds untilListing() const;
 
   struct Changes {
-    std::vector<std::filesystem::path> files;  // that are new, or whose size or time has changed
-    std::vector<std::filesystem::path> gone;   // that were there before
+    std::vector<std::filesystem::path> files;  // new files, and those whose size or time has changed
+    std::vector<std::filesystem::path> gone;   // files that no longer exist
   };
   /// Returns the changes of the files named *.vdi since the last call. `files` are ordered by name,
   /// with numbers compared as numbers. Names that begin with a dot are skipped, because

@@ -18,7 +18,7 @@ struct StageSource {
   double RankReport::*device;  // null: not reported
 };
 
-/// By FrameStage. Only this table names the reports' device times.
+/// The reports' times of each stage, indexed by FrameStage. Only this table names the device times.
 constexpr std::array<StageSource, frameStages> sources{
     {{"generate", &RankReport::generateSeconds, &RankReport::generateDeviceSeconds},
      {"distribute", &RankReport::distributeSeconds, nullptr},

@@ -48,7 +48,7 @@ class Fields {
   void set(Change change) noexcept;
   /// The particles of that name; null if there are none. All ranks have particles of the same names.
   const ParticleArray* particlesOf(const std::string& name) const;
-  /// Sets the values that were made of the particles, one entry for each block; `dropDeposits` drops them
+  /// Sets the values that were made from the particles, one entry for each block; `dropDeposits` drops them
   /// all.
   void setDeposit(const std::string& name, DepositedValues values);
   bool hasDeposit(const std::string& name) const { return deposits_.contains(name); }
@@ -109,7 +109,7 @@ class Fields {
   std::map<Key, Array> arrays_;
   std::map<Key, glm::dvec3> offsets_;  // in cells; none: 0
   std::map<std::string, ParticleArray> particles_;
-  std::map<std::string, DepositedValues> deposits_;  // the memory of arrays made of particles
+  std::map<std::string, DepositedValues> deposits_;  // the memory of arrays made from particles
 };
 
 class Fields::Change {

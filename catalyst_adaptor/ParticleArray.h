@@ -16,7 +16,7 @@ struct ParticleArray {
   DepositKind kind = DepositKind::Sum;
 };
 
-/// The values of cells that are made of particles: those of each block, x fastest.
+/// The values of cells that are made from particles: those of each block, x fastest.
 using DepositedValues = std::vector<std::shared_ptr<float[]>>;
 
 /// Throws std::invalid_argument with the reason if they are invalid.

@@ -25,8 +25,8 @@
  * Calls copy structures, names, strides and arrays of pointers: these may go when the call returns. Calls
  * borrow the values of arrays, and particles' positions, weights and lengths: vdi_catalyst_execute reads them
  * where they are, so they must stay valid and unchanged until it returns. The host holds copies of only the
- * layers beside blocks, and of whole blocks if the blocks' scalar types differ. Arrays made of particles take
- * 4 bytes per cell.
+ * layers beside blocks, and of whole blocks if the blocks' scalar types differ. Arrays made from particles
+ * take 4 bytes per cell.
  *
  * Scripts are Catalyst scripts: Python files for ParaView's module paraview.catalyst. (Catalyst 2, Kitware's
  * C interface, is another way to hand over data: docs/catalyst-guide.md.) They find the blocks, a

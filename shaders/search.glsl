@@ -49,7 +49,8 @@ struct SearchResult {
   uint count;
 };
 
-// With `write`, feeds the list once with the sensitivity `known`, and emitSegment writes; else searches.
+// If `write` is set, feeds the list once with the sensitivity `known`, and emitSegment writes.
+// Otherwise searches for a sensitivity.
 SearchResult searchList(bool write, float known, uint budget) {
   search.writing = write;
   float tooFine = smallestSensitivity;

@@ -60,7 +60,7 @@ bool isOfMpiJob(std::string_view variable) {
     return std::ranges::any_of(prefixes,
                                [&](std::string_view prefix) { return variable.starts_with(prefix); });
   };
-  // Parameters that users set have such names, too.
+  // Users may set parameters whose names begin with OMPI_MCA_, too.
   constexpr std::array<std::string_view, 7> jobs{"OMPI_MCA_orte_",
                                                  "OMPI_MCA_ess",
                                                  "OMPI_MCA_pmix",

@@ -377,7 +377,7 @@ TEST_CASE("seconds count from the last frame, and any trigger will do") {
   schedule.begin(0.0, 5.0);
   CHECK_FALSE(schedule.isDue(4, 0.0, 64.0));
   CHECK(schedule.isDue(10, 0.0, 20.0));
-  schedule.begin(0.0, 20.0);  // because of the step
+  schedule.begin(0.0, 20.0);  // the step triggered this frame
   CHECK(schedule.isDue(11, 0.0, 65.0));
   schedule.setPeriod(7);
   CHECK_FALSE(schedule.isDue(11, 0.0, 1e6));

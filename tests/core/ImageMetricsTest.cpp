@@ -132,7 +132,7 @@ TEST_CASE("An empty background doesn't hide what differs in the object") {
   CHECK(objectSsim(a, b, width, height, 3) == Approx(place.ssim).margin(tolerance).epsilon(0.0));
   CHECK(objectSsim(a, a, width, height, 3) == Approx(1.0).margin(tolerance));
   CHECK(compare(a, b, width, height, 3).ssim > 0.7);
-  // On backgrounds of their own.
+  // Pictures whose backgrounds differ.
   const Pixels empty(a.size(), 200);
   CHECK(objectBox(a, empty, width, height, 3).width == 20);
   CHECK(objectBox(empty, Pixels(a.size(), 10), width, height, 3).width == 0);

@@ -20,7 +20,7 @@ LOW, HIGH = N * WORLD.rank // WORLD.size, N * (WORLD.rank + 1) // WORLD.size
 
 
 def field(step, x, z):
-    """[z][y][x]; x are the coordinates along x and y."""
+    """The values, [z][y][x]. `x` holds the coordinates along both x and y."""
     squares = x[None, None, :] ** 2 + x[None, :, None] ** 2 + z[:, None, None] ** 2
     return (0.15 + 0.01 * step) * np.exp(-8 * squares)
 

@@ -16,7 +16,7 @@ N = 16  # cells along an axis of each rank's block
 assert os.path.samefile(os.path.dirname(os.path.dirname(pv_vdi.__file__)), sys.argv[1]), pv_vdi.__file__
 world = MPI.COMM_WORLD
 folder = world.bcast(tempfile.mkdtemp() if world.rank == 0 else None)
-output = os.path.join(folder, "installed.vdi")
+output = os.path.join(folder, "{timestep}.vdi")
 run = {"field": "V", "colors": {"range": [0, 1]}, "resolution": [160, 90], "output": output}
 with Catalyst(world, json=run) as catalyst:
     catalyst.set_blocks([Block(cells=(N, N, N), origin=(world.rank, 0, 0), spacing=(1 / N,) * 3)])
@@ -24,10 +24,11 @@ with Catalyst(world, json=run) as catalyst:
     catalyst.execute(0, 0.0)
 
 if world.rank == 0:
-    vdi = pv_vdi.read(output)
+    file = output.format(timestep=0)
+    vdi = pv_vdi.read(file)
     assert vdi.size == (160, 90) and len(vdi.segments) > 0, vdi.size
     colors, depths = vdi.render(vdi.camera.azimuth(20.0))
     shown = np.isfinite(depths).mean()
     assert 0.02 < shown < 0.9 and colors[..., 3].max() > 0.1, (shown, colors[..., 3].max())
-    os.remove(output)
+    os.remove(file)
     os.rmdir(folder)

@@ -26,7 +26,7 @@ TEST_CASE("a VDI in the memory of another one, whatever its precision and size w
     settings = test::smallSettings(40, 30, 5);
     Vdi again = vdiOf();
     CHECK(again == first);
-    // Also in the memory of a picture that is as large, or smaller.
+    // The VDI is the same in the memory of an equal or a smaller picture, too.
     again = {};
     again = vdiOf();
     CHECK(again == first);

@@ -23,7 +23,7 @@ TEST_CASE("slopes of faces: the device's are the reference's") {
   const auto vdi = generator.generate(test::oblique(parallel), test::threeHues(1.0), settings);
   detail::LoadedVdi loaded;
   detail::VdiLoader loader(test::device());
-  loader.load(*vdi, loaded, detail::VdiLoader::Kind::Beside);
+  loader.load(*vdi, loaded, detail::VdiLoader::Kind::DuringRenders);
   const std::uint64_t bytes = vdi->supersegmentCount() * sizeof(Slopes);
   gpu::Buffer readback(test::device(), bytes, gpu::MemoryKind::Readback);
   gpu::Commands commands(test::device());

@@ -290,7 +290,7 @@ bins = [table.GetColumn(1).GetValue(i) for i in range(2)]
 check(0.8 < bins[0] / bins[1] < 1.25, "the phase's histogram has about as many negative values as positive ones: %s" % bins)
 image.SelectInputScalars, image.Component = ["POINTS", "Q criterion"], -1
 
-# After a state file, which knows the map by a name without the space.
+# A filter loaded from a state file, which names the map without the space.
 state = os.path.join(OUTPUT, "arrays.pvsm")
 simple.SaveState(state)
 simple.ResetSession()
@@ -300,7 +300,7 @@ picture(again)
 again.SelectInputScalars = ["POINTS", "temperature"]
 check(again.LookupTable == simple.GetColorTransferFunction("temperature"), "a state's filter takes another array's map, too")
 
-# After Delete and Undo.
+# A filter restored by Undo after Delete.
 stack, builder = vtkSMUndoStack(), vtkSMUndoStackBuilder()
 builder.SetUndoStack(stack)
 vtkSMProxyManager.GetProxyManager().SetUndoStackBuilder(builder)

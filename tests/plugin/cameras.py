@@ -1,6 +1,6 @@
 """Filters of one input share its volume. Another camera costs no upload and next to no memory, and
-its VDI is that of a filter on its own. No filter changes another's VDI. On any number of ranks. The
-times are this machine's."""
+its VDI is that of a filter on its own. No filter changes another's VDI. This holds on any number of
+ranks. The printed times are those of the machine at hand."""
 
 import time
 

@@ -70,7 +70,7 @@ for source in (image, read):
     worst = np.abs(picture(rendered).astype(int) - flat).max()
     check(worst <= 2, "RenderVDI from V_O gives the flat picture, off by %d" % worst)
 
-# As a page for browsers: the same VDI is inside.
+# The same VDI, saved as a page for browsers.
 page = os.path.join(OUTPUT, "wavelet.html")
 simple.SaveData(page, proxy=image)
 read = simple.OpenDataFile(vdi_in_page(page, os.path.join(OUTPUT, "wavelet_page.vdi")))

@@ -35,7 +35,7 @@ def use():
     image.ScalarOpacityUnitDistance = 3
     image.UpdatePipeline()
     cropping = image.SMProxy.GetProperty("Cropping")
-    cropping.SetUncheckedElement(0, 1)  # what the panel does before Apply
+    cropping.SetUncheckedElement(0, 1)  # as the panel does before Apply
     pvtest.check(list(image.CroppingBox) == [-10, 10] * 3,
                  "a tick at Cropping shows the input's bounds: %s" % list(image.CroppingBox))
     cropping.ClearUncheckedElements()

@@ -62,7 +62,7 @@ scene.AnimationTime = reader.TimestepValues[0]
 check(look(view, "after").std() > 5 and not pvtest.message_in(view),
       "the step after the damaged file is shown, without a message")
 
-# A view that is closed while a VDI is loaded for it, whose last frame showed the previous one.
+# Closes a view that still shows the previous VDI while the next one is loaded for it.
 for _ in range(3):
     other = pvtest.make_view(SIZE, [2.2, 1.9, 2.4], [0.5, 0.5, 0.5])
     simple.Show(reader, other)

@@ -23,8 +23,9 @@ for name, (kind, scale, as_cells, parallel_scale) in CASES.items():
     write_png("brain_%s.png" % name, np.hstack([ours, theirs]))
     simple.Delete(view)
 
-# One sample per voxel shows what eight show, where a surface is a voxel wide (no wood grain): opacity that rises from 0
-# to 0.6 over a voxel of material, and opaque bands 4 % of the range wide. Volume rendering and VDI alike.
+# Where a surface is a voxel wide, one sample per voxel shows the same as eight, in volume rendering and in VDIs, without
+# wood grain. The functions: opacity that rises from 0 to 0.6 over a voxel of material, and opaque bands 4 % of the range
+# wide.
 BANDS = [0, 0]
 for middle in (50, 112.5, 175):
     BANDS += [middle - 5, 0, middle - 4.99, 1, middle + 4.99, 1, middle + 5, 0]

@@ -85,7 +85,7 @@ TEST_CASE("no weight is lost: faces, levels, hidden cells, short and long kernel
       test::levelsInCube(2),
   };
   for (const std::vector<Block>& blocks : scenes) {
-    // Longest kernels of 0: cloud in cell; far below a cell; some cells; larger than all blocks.
+    // Longest kernel: 0 (cloud in cell), far below a cell, some cells, larger than all blocks.
     for (const double longest : {0.0, 1e-5, 0.09, 0.4, 50.0}) {
       ParticleSet set = randomParticles(longest > 1.0 ? 3 : 40, cube, longest, 7);
       set.positions.push_back({0.0, 0.0, 0.0});  // the domain's lowest corner

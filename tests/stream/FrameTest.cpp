@@ -1,4 +1,4 @@
-// The levels of a frame, made of a VDI and of its file.
+// The levels of a frame, made from a VDI and from its file.
 
 #include "tests/Catch.h"
 #include "tests/io/Samples.h"

@@ -153,7 +153,7 @@ TEST_CASE("what stalled viewers keep is bounded, and the oldest goes first") {
   for (std::uint32_t id = 0; id < 40; ++id) {
     const Clock::time_point now = start + id * 1s;
     hub.publish(levels.frame(id), now);
-    // As a server does with viewers that it disconnects.
+    // A server ends the writes of viewers that it disconnects.
     for (const auto& viewer : stalled) {
       if (viewer->viewer.isStalled()) viewer->writing = Viewer::Wait{};
     }

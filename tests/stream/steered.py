@@ -19,7 +19,7 @@ opacities = GetOpacityTransferFunction("V")
 opacities.RescaleTransferFunction(0.0, 1.0)
 for function in (colors, opacities):
     function.ScalarRangeInitialized = 1
-image.LookupTable = colors  # which has these opacities
+image.LookupTable = colors  # the map uses these opacities
 image.Resolution = [96, 54]
 image.CameraPosition = [18.0, 20.0, 60.0]
 image.CameraFocalPoint = [18.0, 6.0, 6.0]
@@ -36,7 +36,7 @@ file = open(os.path.join(OUTPUT, "view_%d.txt" % rank), "w")
 
 
 def catalyst_execute(info):
-    """Before the extractors of the step."""
+    """Runs before the step's extractors."""
     line = {"step": info.timestep, "position": list(image.CameraPosition), "angle": image.CameraViewAngle,
             "resolution": list(image.Resolution), "supersegments": image.Supersegments, "rate": image.SamplingRate,
             "colours": [colors.RGBPoints[0], colors.RGBPoints[-4]], "opacities": [opacities.Points[0], opacities.Points[-4]],

@@ -35,7 +35,7 @@ check(note["representations"] == ["VDI"], "what was opened is shown as a VDI")
 # A slow machine makes few of them in a drag of 1.5 s.
 check(opened or note["interactive frames"] > 1, "there are frames while the mouse moves")
 
-# The view's place on the screen is unknown; its picture fits best there.
+# The view's place on the screen is unknown: take the place where its picture fits best.
 screen = pvtest.read_png(sys.argv[1]).astype(float).mean(axis=2)
 view = seen.astype(float).mean(axis=2)
 freedom = (screen.shape[0] - view.shape[0] + 1, screen.shape[1] - view.shape[1] + 1)

@@ -253,7 +253,7 @@ def first_session(window):
           "Save Data asks nothing twice")
     window.save("Save State...", state)
     window.select(1)
-    window.open_by_double_click("first.vdi")  # beside the volume that it was made of
+    window.open_by_double_click("first.vdi")  # beside the volume that it was made from
     window.apply(60)
     window.wait_for_picture()
     window.screenshot("11_opened.png")

@@ -1,4 +1,4 @@
-"""By mouse, with a server on two ranks, as the guide describes it: makes a VDI of a shown volume,
+"""Uses a server on two ranks by mouse, as the guide describes: makes a VDI of a shown volume,
 edits its opacity, orbits it and saves it. Then starts ParaView anew, without the server, opens the
 file and orbits again. What the view shows is compared with the tool's
 picture for its camera (seen.py). Leaves a screenshot of each step in VDI_TEST_OUTPUT."""

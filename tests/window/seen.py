@@ -19,7 +19,7 @@ def view_in(state):
 
 
 def tools_picture(vdi, view, path):
-    """Over black, [rows][columns][3] in 0 to 255."""
+    """The tool's picture over black, [rows][columns][3] in 0 to 255."""
     assert view["CameraParallelProjection"][0] == "0"
     subprocess.run([os.environ["VDI_TOOL"], "render", vdi, "-o", path, "--resolution", "x".join(view["ViewSize"]),
                     "--position", *view["CameraPosition"], "--focal-point", *view["CameraFocalPoint"],

@@ -193,7 +193,7 @@ class Widget:
 
     @property
     def tip(self):
-        """Without marks: forky's ParaView has HTML in some."""
+        """The tool tip without HTML tags, which some of forky's ParaView have."""
         tip = self._property("Description")
         return html.unescape(re.sub("<[^>]*>", "", tip)).strip() if tip.startswith("<html>") else tip
 

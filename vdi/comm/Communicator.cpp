@@ -97,8 +97,8 @@ Text describe(const std::exception_ptr& error) {
 
 /// The number of a rank's simulated host.
 int hostOf(int localRank) {
-  const auto each = static_cast<int>(environmentCount("VDI_RANKS_PER_HOST", 0).value_or(0));
-  return each > 0 ? localRank / each : 0;
+  const std::uint32_t each = environmentCount("VDI_RANKS_PER_HOST", 0).value_or(0);
+  return each > 0 ? static_cast<int>(static_cast<std::uint32_t>(localRank) / each) : 0;
 }
 
 /// Frees a communicator, unless MPI has been finalised.
@@ -188,7 +188,7 @@ struct Communicator::State {
     call("MPI_Alltoall", MPI_Alltoall, MPI_Ialltoall, to.data(), count, MPI_UINT64_T, from.data(), count,
          MPI_UINT64_T, comm());
   }
-  /// Lays `in` out for every rank's number of elements.
+  /// Lays out `in` by the numbers of elements that the ranks send.
   void layOut(std::uint64_t mine) {
     allGather(std::span(&mine, 1), sizes);
     in.set(sizes);

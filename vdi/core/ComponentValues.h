@@ -22,7 +22,7 @@ enum class ComponentType : std::uint32_t {
   U64 = 9
 };
 
-/// In place of a component's number, as in ScalarArray::component.
+/// Special values of a component's number, as in ScalarArray::component.
 constexpr int magnitude = -1;  // magnitude of all components
 constexpr int phase = -2;      // phase of two, real and imaginary: from -pi to pi, 0 for the number 0
 

@@ -94,7 +94,7 @@ inline const Supersegment& expanded(const Supersegment& segment, const DepthCode
   return segment;
 }
 
-/// Compact lists: list i is segments[offsets[i] .. offsets[i + 1]), front to back, disjoint.
+/// Lists without gaps: list i is segments[offsets[i] .. offsets[i + 1]), front to back, disjoint.
 template <typename Segment>
 struct ListsOf {
   HostVector<std::uint32_t> offsets{0};  // exclusive prefix sum, listCount() + 1 entries

@@ -13,7 +13,7 @@
 
 namespace vdi::gpu {
 
-/// In order of preference, the best last.
+/// Types in ascending order of preference.
 enum class DeviceType { Other, Cpu, Virtual, Integrated, Discrete };
 
 struct DeviceCandidate {

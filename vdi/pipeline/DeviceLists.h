@@ -16,7 +16,7 @@ namespace vdi::detail {
 
 constexpr std::uint64_t wordBytes = sizeof(std::uint32_t);
 
-/// Compact lists as in ListsOf, in device memory that later lists reuse.
+/// Lists without gaps as in ListsOf, in device memory that later lists reuse.
 struct DeviceLists {
   gpu::Buffer offsets;   // u32 [listCount + 1], exclusive prefix sum
   gpu::Buffer segments;  // [count], of an encoding's type

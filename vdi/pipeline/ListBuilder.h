@@ -1,10 +1,9 @@
-// Makes compact lists from intervals, on the device, band by band (paper, section 4). RayCaster and
+// Makes lists without gaps from intervals, on the device, band by band (paper, section 4). RayCaster and
 // Compositor share it; not part of the library's interface. vdi/reference/Segmenter.h describes the
 // algorithms.
 //   Bisection: search of sensitivities, prefix sum of the counts, write.
-//   Merge: count of pre-segments, in all lists or one of countedStride x countedStride; interpolation of
-//   tolerances to all lists; prefix sum; write of pre-segments; prefix sum of the numbers to keep; reduction.
-//   Merge with other ranks: the same, with counts that all ranks agreed on.
+//   Merge: the five steps of docs/architecture.md, with a prefix sum before steps 3 and 5. With other ranks,
+//   all ranks agree on the counts first.
 #pragma once
 
 #include <cstdint>

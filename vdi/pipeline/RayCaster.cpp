@@ -150,8 +150,8 @@ RayCaster::Cast RayCaster::begin(const Inputs& inputs) {
   started_ = finished_ = 0;  // frames of one band use one builder's memory
   cast.height = static_cast<std::uint32_t>(inputs.view.height());
   cast.cutAtGaps = inputs.cutAtGaps;
-  cast.nothingThere = volume_.empty() || inputs.lattice.count == 0;
-  if (!cast.nothingThere) cast.params = prepare(inputs);
+  cast.isEmpty = volume_.empty() || inputs.lattice.count == 0;
+  if (!cast.isEmpty) cast.params = prepare(inputs);
   const std::uint32_t maxCount = maxPerList(inputs.settings.supersegments, inputs.settings.budget);
   ListBuilder::Options& build = cast.build;
   build.width = static_cast<std::uint32_t>(inputs.view.width());
@@ -170,7 +170,7 @@ RayCaster::Cast RayCaster::begin(const Inputs& inputs) {
       build.countedStride > 1 ? shared::countedSamplesFor(inputs.lattice.count, inputs.settings.supersegments)
                               : 1;
   // A list's need is known only when all ranks' parts of it are together: until then, parts get N_S each.
-  if (inputs.settings.budget == Budget::Total && !inputs.cutAtGaps && !cast.nothingThere) {
+  if (inputs.settings.budget == Budget::Total && !inputs.cutAtGaps && !cast.isEmpty) {
     cast.params.level = levelOfNeed(cast.params, inputs);
   }
   return cast;
@@ -199,7 +199,7 @@ void RayCaster::countLevels(Cast& cast, HostAccess& memory, std::uint64_t at) {
   cast.params.levelShift = levelShiftFor(cast.build.maxPerList.supersegments);
   cast.params.countedWidth = cast.build.countedWidth();
   commands_.begin();
-  if (cast.nothingThere) {
+  if (cast.isEmpty) {
     commands_.fill(levels_, 0);
   } else {
     commands_.mark("count");
@@ -211,7 +211,7 @@ void RayCaster::countLevels(Cast& cast, HostAccess& memory, std::uint64_t at) {
   memory.recordWrite(commands_, levels_, 0, at, bytes);
   commands_.submitAndWait();
   memory.finish();
-  if (!cast.nothingThere) {
+  if (!cast.isEmpty) {
     const double milliseconds = commands_.stageTimes().front().milliseconds;
     times_ += {milliseconds, milliseconds, 0.0};
   }
@@ -271,7 +271,7 @@ void RayCaster::startBand(Cast& cast, std::uint32_t firstRow, std::uint32_t last
   ListBuilder::Options build = cast.build;
   build.rows = lastRow - firstRow;
   build.rowBehind = lastRow < cast.height;
-  if (cast.nothingThere) {
+  if (cast.isEmpty) {
     builder.startEmpty(build.listCount(), lists, behind);
     ++started_;
     return;

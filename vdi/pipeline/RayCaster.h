@@ -51,7 +51,7 @@ class RayCaster {
     gpu::shared::CastParams params{};
     ListBuilder::Options build;  // without the band's rows
     bool cutAtGaps = false;
-    bool nothingThere = false;
+    bool isEmpty = false;
     std::uint32_t height = 0;
     std::uint32_t rowsPerBand = 1;  // as memory allows; a multiple of shared::countedStride, or all rows
     bool agreed = false;            // ranks agree on each list's tolerance

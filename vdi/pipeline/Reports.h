@@ -25,7 +25,7 @@ struct RankReport {
   double samplesPerVoxel = 0.0;         // rate of the frame, also with automaticRate
   std::uint64_t blocks = 0;             // blocks that this rank has set
   std::uint64_t volumeBytes = 0;        // size of their stored values
-  std::uint64_t subSupersegments = 0;   // supersegments made of them, before compositing
+  std::uint64_t subSupersegments = 0;   // supersegments made from them, before compositing
   std::uint64_t bytesSent = 0;          // bytes of lists, pixels and file chunks sent to other ranks
   std::uint64_t bytesWritten = 0;       // bytes that write put into the file from this rank
   std::uint64_t deviceBytes = 0;        // device memory held

@@ -127,7 +127,7 @@ struct VdiGenerator::State {
   RankReport mine;
   std::vector<RankReport> reports;
 
-  /// Checked parameters, which generate, write and renderVolume share.
+  /// Checked parameters, which all functions that make frames share.
   struct Prepared {
     View view;
     DepthLattice lattice;

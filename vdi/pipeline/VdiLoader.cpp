@@ -20,7 +20,7 @@ namespace {
 
 /// The most bytes staged at a time with Kind::Alone. Uploads up to this size continue after `load` returns.
 constexpr std::uint64_t aloneBytes = std::uint64_t{128} << 20;
-/// The most bytes staged at a time with Kind::Beside. A render waits for the part under way.
+/// The most bytes staged at a time with Kind::DuringRenders. A render waits for the part under way.
 constexpr std::uint64_t besideBytes = std::uint64_t{2} << 20;
 
 }  // namespace
@@ -169,7 +169,7 @@ void VdiLoader::loadLists(const ListsOf<Segment>& lists, Kind kind) {
   commands_.barrier();
   recordMasks();
   commands_.submit();
-  if (kind == Kind::Beside) commands_.wait();
+  if (kind == Kind::DuringRenders) commands_.wait();
 }
 
 void VdiLoader::load(const Vdi& vdi, LoadedVdi& target, Kind kind) {

@@ -45,10 +45,10 @@ class VdiLoader {
  public:
   explicit VdiLoader(std::shared_ptr<gpu::Device> device);
 
-  /// Alone: the loader has the device to itself. Beside: renders continue meanwhile.
-  enum class Kind { Alone, Beside };
+  /// Alone: the loader has the device to itself. DuringRenders: renders continue meanwhile.
+  enum class Kind { Alone, DuringRenders };
   /// Copies the VDI. Alone, the device continues after this returns (for VDIs of up to 128 MiB; larger ones
-  /// wait for all but their last part). With Kind::Beside, the VDI is loaded when this returns.
+  /// wait for all but their last part). With Kind::DuringRenders, the VDI is loaded when this returns.
   void load(const Vdi& vdi, LoadedVdi& target, Kind kind);
 
   /// Starts to load from the device's lists, band after band; `header` is the VDI without lists. `target`

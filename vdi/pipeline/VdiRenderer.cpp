@@ -64,7 +64,7 @@ void VdiRenderer::setVdi(const Vdi& vdi) {
 void VdiRenderer::prepareVdi(const Vdi& vdi) {
   state_->waitForShown();
   try {
-    state_->loader.load(vdi, state_->prepared, detail::VdiLoader::Kind::Beside);
+    state_->loader.load(vdi, state_->prepared, detail::VdiLoader::Kind::DuringRenders);
   } catch (...) {
     state_->prepared = {};
     throw;

@@ -45,8 +45,9 @@ Run runFrom(std::span<const Supersegment> list, std::size_t first) {
   return run;
 }
 
-/// The run that overlaps [front, back] most, or the nearest one within maxSlope footprints. The search begins
-/// at `from`, and sets it to the run's first supersegment. If no run is found, opticalDepth is negative.
+/// The run that overlaps [front, back] most, or the nearest one within renderMaxSlope footprints. The search
+/// begins at `from`, and sets it to the run's first supersegment. If no run is found, opticalDepth is
+/// negative.
 Run runBeside(std::span<const Supersegment> list, float front, float back, float footprint,
               std::size_t& from) {
   const float reach = renderMaxSlope * footprint;

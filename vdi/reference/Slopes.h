@@ -41,12 +41,12 @@ ListBox listBoxOf(const Vdi& vdi, float farthest);
 
 /// The slopes of all supersegments, [lists.segments.size()]. For each of the four lists beside a list:
 ///   1. A run, supersegments that touch each other, belongs to the neighbour's run that it overlaps most, or
-///      that is nearest within maxSlope footprints.
+///      that is nearest within renderMaxSlope footprints.
 ///   2. A face in the front half of its run's optical depth continues where the neighbour's run has the same
 ///      optical depth in front; another face, where it has the same behind. A face without such a place
-///      within maxSlope footprints has no slope towards that neighbour.
+///      within renderMaxSlope footprints has no slope towards that neighbour.
 ///   3. The slope along an axis is the mean of both neighbours', or that of one if the other has none.
-/// Slopes fade out for material whose opacity over a footprint is below twice leastOpacity: haze has no
+/// Slopes fade out for material whose opacity over a footprint is below twice renderLeastOpacity: haze has no
 /// faces.
 ///
 /// A list's first front and last back are on a face if the list's ray enters or leaves the box there.

@@ -85,7 +85,7 @@ void Publisher::note(const std::exception& error) noexcept {
   try {
     trouble_ = error.what();
   } catch (const std::exception&) {
-    trouble_ = "no memory";  // short enough to need none
+    trouble_ = "no memory";  // short enough to be stored without an allocation
   }
 }
 

@@ -89,7 +89,7 @@ class Server::Impl {
   ~Impl() {
     try {
       asio::post(context_, [this] { finish(); });
-    } catch (const std::exception&) {  // without memory, peers get no goodbye
+    } catch (const std::exception&) {  // out of memory, peers get no goodbye
       context_.stop();
     }
     thread_.join();
@@ -247,7 +247,7 @@ class Server::Impl {
     isEnding_ = true;
     try {
       sayGoodbye();
-    } catch (const std::exception&) {  // without memory
+    } catch (const std::exception&) {  // out of memory
       context_.stop();
     }
   }

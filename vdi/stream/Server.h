@@ -14,7 +14,7 @@
 namespace vdi::stream {
 
 struct ServerOptions {
-  std::string host = "127.0.0.1";    // whose address the server listens at
+  std::string host = "127.0.0.1";    // the address at which the server listens
   std::uint16_t port = 0;            // 0: any free port
   bool listens = true;               // false: serves only the sockets given to adopt()
   std::string token;                 // must satisfy requireToken

@@ -78,7 +78,7 @@ std::string objectionTo(const Wish& wish, const Controls& controls);
 void merge(Wish& wish, const Wish& later);
 
 struct SteeringRequest {
-  std::uint32_t viewer = 0;  // that asked last
+  std::uint32_t viewer = 0;  // the viewer that asked last
   Wish wish;                 // all wishes since the last take()
 };
 

@@ -31,7 +31,7 @@ void retire(std::shared_ptr<void> thing) {
   try {
     retired().jobs.push_back(
         std::async(std::launch::async, [last = std::move(thing)]() mutable { last.reset(); }));
-  } catch (const std::system_error&) {  // there is no thread, so the caller has waited
+  } catch (const std::system_error&) {  // without a thread, the caller's has destroyed it
   }
 }
 

@@ -208,7 +208,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   bool HasViewpointOfView = false;          // set by SetViewpoint
   bool Choosing = false;                    // true within ChooseLookupTable and FollowArray
   std::string Chosen;                       // the array whose map this proxy has set
-  vtkWeakPointer<vtkSMProxy> ChosenMap;     // that map
+  vtkWeakPointer<vtkSMProxy> ChosenMap;     // the map that ChooseLookupTable has set
   std::optional<Subject> Shown;             // the subject of the last map
   std::optional<double> TakenUnitDistance;  // taken from a view
   struct InputOfRanks;

@@ -1,5 +1,5 @@
 // The property widget `vdi_vector`: the numbers of a vector below its label, over the whole width of the
-// panel. ParaView's own widget puts three numbers beside the label, too narrow for six digits.
+// panel. ParaView's own widget puts three numbers beside the label, where six digits don't fit.
 #ifndef pqVDIVectorWidget_h
 #define pqVDIVectorWidget_h
 

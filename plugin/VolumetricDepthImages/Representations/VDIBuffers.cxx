@@ -121,9 +121,9 @@ void VDIBuffers::takeOne() {
     }
   } catch (const vdi::Error& error) {
     hasVdi_ = false;
-    const bool isSound =
+    const bool vdiIsAtFault =
         error.code() == vdi::ErrorCode::Format || error.code() == vdi::ErrorCode::InvalidArgument;
-    if (!isSound) renderers_ = std::make_shared<Renderers>();
+    if (!vdiIsAtFault) renderers_ = std::make_shared<Renderers>();
     this->startNext();
     throw;
   } catch (...) {

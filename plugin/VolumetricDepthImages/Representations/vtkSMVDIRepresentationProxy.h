@@ -2,8 +2,8 @@
  * @class vtkSMVDIRepresentationProxy
  * @brief shows a VDI, with the legend of its colours and without a selection
  *
- * While the representation is VDI, ParaView takes the VDI as coloured by the array that it was made of, with
- * the filter's maps. Toolbar, colour editor and scalar bars then act on these maps. They don't colour
+ * While the representation is VDI, ParaView takes the VDI as coloured by the array that it was made from,
+ * with the filter's maps. Toolbar, colour editor and scalar bars then act on these maps. They don't colour
  * anything here, because a VDI has its colours already. The data have values with the array's name
  * (VDIValues.h), which give ranges and histograms. An opened file brings maps of its own; editing them
  * changes the legend alone.

@@ -1,6 +1,6 @@
 /**
  * @class vtkVDIOutlineRepresentation
- * @brief shows the box of the volume that a Volumetric Depth Image was made of
+ * @brief shows the box of the volume that a Volumetric Depth Image was made from
  *
  * ParaView's own outline of the image that carries a VDI would frame the flat picture's pixels.
  */
