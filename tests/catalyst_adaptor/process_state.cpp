@@ -1,7 +1,7 @@
 // A simulation that has its own settings of the process, and checks after each call of the adaptor
 // that they are unchanged: signals, floating point, locale, environment, folder, umask, limits,
-// streams. Argument: a script that changes all it can. Exit status 0 if each call succeeded and
-// nothing had changed.
+// streams. Argument: a script that changes all it can, or a JSON text. Exit status 0 if each call
+// succeeded, but for the first one, which is refused, and nothing had changed.
 #include <dirent.h>
 #include <fcntl.h>
 #include <mpi.h>
@@ -209,7 +209,7 @@ void makeOwnSettings() {
 
 int wrong = 0;
 
-void compare(const char* call, int code, const State& before) {
+void compare(const char* call, int code, const State& before, int wanted = VDI_CATALYST_OK) {
   const State now = stateOfProcess();
   const auto valueIn = [](const State& state, const std::string& what) {
     const auto found = state.find(what);
@@ -217,8 +217,8 @@ void compare(const char* call, int code, const State& before) {
   };
   State both = before;
   both.insert(now.begin(), now.end());
-  if (code != VDI_CATALYST_OK) {
-    std::fprintf(stderr, "FAILED: %s returned %d\n", call, code);
+  if (code != wanted) {
+    std::fprintf(stderr, "FAILED: %s returned %d, not %d\n", call, code, wanted);
     ++wrong;
   }
   for (const auto& [what, ignored] : both) {
@@ -236,14 +236,23 @@ void compare(const char* call, int code, const State& before) {
 int main(int argc, char** argv) {
   MPI_Init(&argc, &argv);
   if (argc < 2) MPI_Abort(MPI_COMM_WORLD, 2);
-  std::filesystem::current_path("/");
+  const std::string what = argv[1];
+  const bool isScript = what.ends_with(".py");
+  const MPI_Fint comm = MPI_Comm_c2f(MPI_COMM_WORLD);
+  if (!isScript)
+    std::filesystem::current_path(std::getenv("VDI_OUTPUT"));  // a script names the folder itself
+  if (isScript) std::filesystem::current_path("/");
   makeOwnSettings();
   const State before = stateOfProcess();
 
   vdi_catalyst* catalyst = nullptr;
-  const std::array<const char*, 1> scripts{argv[1]};
-  int code = vdi_catalyst_initialize(MPI_Comm_c2f(MPI_COMM_WORLD), 1, scripts.data(), &catalyst);
-  compare("initialize", code, before);
+  const auto initialize = [&](const char* given) {
+    if (!isScript) return vdi_catalyst_initialize_json(comm, given, &catalyst);
+    return vdi_catalyst_initialize(comm, 1, &given, &catalyst);
+  };
+  const char* const refused = isScript ? "/nowhere.py" : R"({"field": "V", "every": -1})";
+  compare("a refused initialize", initialize(refused), before, VDI_CATALYST_SCRIPT);
+  compare("initialize", initialize(what.c_str()), before);
   constexpr int n = 8;
   static std::array<float, n * n * n> values;
   int rank = 0;
@@ -252,18 +261,28 @@ int main(int argc, char** argv) {
       {n, n, n}, {0, 0, 0}, {0, 0, 0}, {static_cast<double>(n * rank), 0, 0}, {1, 1, 1}};
   const std::array<const void*, 1> data{values.data()};
   compare("set_blocks", vdi_catalyst_set_blocks(catalyst, 1, &block), before);
-  code = vdi_catalyst_set_array(catalyst, "V", VDI_CATALYST_F32, VDI_CATALYST_CELLS, data.data());
-  compare("set_array", code, before);
+  compare("set_array",
+          vdi_catalyst_set_array(catalyst, "V", VDI_CATALYST_F32, VDI_CATALYST_CELLS, data.data()), before);
+  const std::array<double, 3> position{n * rank + 0.5 * n, 0.5 * n, 0.5 * n};
+  vdi_catalyst_particles particles{};
+  particles.count = 1;
+  particles.kind = VDI_CATALYST_DENSITY;
+  particles.position_type = VDI_CATALYST_F64;
+  for (std::size_t axis = 0; axis < position.size(); ++axis) particles.positions[axis] = &position[axis];
+  particles.position_stride = sizeof position;
+  compare("set_particles", vdi_catalyst_set_particles(catalyst, "P", &particles), before);
   constexpr int steps = 2;
   for (int step = 1; step <= steps; ++step) {
     for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i + 10 * step);
     std::feclearexcept(FE_ALL_EXCEPT);
     std::feraiseexcept(FE_INEXACT);
+    const bool isWanted = vdi_catalyst_wants(catalyst, step, step) != 0;
+    compare("wants", isWanted ? VDI_CATALYST_OK : VDI_CATALYST_ENGINE, before);
     compare("execute", vdi_catalyst_execute(catalyst, step, step), before);
   }
   compare("finalize", vdi_catalyst_finalize(catalyst), before);
   // A script in a separate process sends the signals to that process.
-  const int sent = std::getenv("VDI_ISOLATION") == nullptr ? steps : 0;
+  const int sent = isScript && std::getenv("VDI_ISOLATION") == nullptr ? steps : 0;
   if (terminations != sent) {
     std::fprintf(stderr, "FAILED: of %d signals that the script sent, %d came\n", sent,
                  static_cast<int>(terminations));
