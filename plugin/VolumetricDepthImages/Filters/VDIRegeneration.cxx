@@ -17,6 +17,7 @@ void Regeneration::hold() {
 
 bool Regeneration::release(vtkMTimeType now) {
   isHeld_ = false;
+  if (std::exchange(isPutOff_, false)) askedTime_.Modified();
   return executed_ != now || asked_.has_value();
 }
 

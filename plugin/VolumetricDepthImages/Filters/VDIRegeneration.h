@@ -39,6 +39,9 @@ class Regeneration {
   /// Returns whether the output is out of date. If so, the filter calls Modified on itself, and then
   /// carryOver.
   bool release(vtkMTimeType now);
+  /// Notes that an update has given an earlier output, because it came in the middle of another update.
+  /// `release` makes views request the output again.
+  void putOff() { isPutOff_ = true; }
   /// Declares that the output prepared for the properties at time `before` is good for those at `now`.
   void carryOver(vtkMTimeType before, vtkMTimeType now);
   bool isHeld() const { return isHeld_; }
@@ -112,10 +115,12 @@ class Regeneration {
   bool isPreparedHere(const Origin& origin) const;
 
   bool isHeld_ = false;
+  bool isPutOff_ = false;
   bool defers_ = false;
   int views_ = 0;  // number of beginView calls that lack their endView
   std::optional<ViewRequest> asked_;
-  vtkTimeStamp askedTime_;  // time of the last endView that left asked_, or of the answer to asked_
+  /// Time of the last endView that left asked_, of the answer to asked_, or of the release after putOff.
+  vtkTimeStamp askedTime_;
   bool isInPlace_ = false;
   /// After a failure, the data count as newer than any output. Otherwise rank 0 would try again alone,
   /// because VTK's executive doesn't accept rank 0's empty output.

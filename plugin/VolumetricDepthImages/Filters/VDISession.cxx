@@ -14,6 +14,8 @@
 
 namespace pv {
 
+int RunningUpdate::count_ = 0;
+
 vdi::comm::Communicator communicatorOf(vtkMultiProcessController* controller) {
   auto* communicator =
       controller != nullptr ? vtkMPICommunicator::SafeDownCast(controller->GetCommunicator()) : nullptr;

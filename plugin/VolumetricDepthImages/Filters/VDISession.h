@@ -31,6 +31,23 @@ void enterCollective(vtkMultiProcessController* controller, const std::string& o
 /// Whether a simulation's adaptor watches over such operations.
 bool isWatched(vtkMultiProcessController* controller);
 
+/// An update by the main thread that makes a VDI. It shows its progress, and ParaView's progress bar lets
+/// timers run, which may request updates in the middle of this one.
+class RunningUpdate {
+ public:
+  RunningUpdate() { ++count_; }
+  ~RunningUpdate() { --count_; }
+  RunningUpdate(const RunningUpdate&) = delete;
+  RunningUpdate& operator=(const RunningUpdate&) = delete;
+  RunningUpdate(RunningUpdate&&) = delete;
+  RunningUpdate& operator=(RunningUpdate&&) = delete;
+  /// Whether there is one, of any filter. Main thread.
+  static bool exists() { return count_ > 0; }
+
+ private:
+  static int count_;
+};
+
 /// The process's device. The first call makes it, and it lives as long as a caller holds it. If the device is
 /// lost, the function makes a new one. Any thread may call it. Throws vdi::Error{DeviceUnavailable}.
 std::shared_ptr<vdi::gpu::Device> sharedDevice(int localRank);

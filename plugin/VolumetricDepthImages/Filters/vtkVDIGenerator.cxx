@@ -150,17 +150,20 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   // On several ranks, a writer asks for another piece of the output that has been made already.
   const bool isMade = regeneration.isMade(origin, this->CurrentMTime()) &&
                       (regeneration.made()->GetNumberOfPoints() > 0 || !this->IsRoot());
+  if (pv::RunningUpdate::exists()) {
+    if (isMade) return this->GiveMade(origin, output);
+    return this->PutOff(output);
+  }
+  const pv::RunningUpdate running;
   const pv::Regeneration::Last last = regeneration.begin(this->CurrentMTime());
   std::exception_ptr failure;
   try {
     this->Enter();
     if (pv::onAllRanks(this->Controller, isMade)) {
-      output->ShallowCopy(regeneration.made());
-      pv::setTime(output, origin.time);
       regeneration.keep(last);
       regeneration.answer();
       regeneration.giveUpOther(origin);
-      return 1;
+      return this->GiveMade(origin, output);
     }
     if (this->Defer(input, origin, last.hasFailed, output)) {
       regeneration.keep(last);
@@ -194,6 +197,21 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   return 1;
 }
 
+int vtkVDIGenerator::GiveMade(const pv::Origin& origin, vtkImageData* output) {
+  output->ShallowCopy(this->Internal->Regeneration.made());
+  pv::setTime(output, origin.time);
+  return 1;
+}
+
+/// Ends a request that comes in the middle of an update, for which it would wait for ever. Gives the last
+/// picture. Observers of PutOffEvent request the VDI again after the update.
+int vtkVDIGenerator::PutOff(vtkImageData* output) {
+  this->KeepEarlier(output);
+  this->Internal->Regeneration.putOff();
+  this->InvokeEvent(PutOffEvent);
+  return 1;
+}
+
 /// Ends a request without a VDI, and returns RequestData's result.
 int vtkVDIGenerator::EndWithout(const std::exception_ptr& failure, vtkImageData* output) {
   output->Initialize();
@@ -223,7 +241,7 @@ bool vtkVDIGenerator::DropLostDevice() {
   return true;
 }
 
-/// After an abort, gives rank 0 the last picture, or an empty one if that has another size.
+/// Gives rank 0 the last picture, or an empty one if that has another size.
 void vtkVDIGenerator::KeepEarlier(vtkImageData* output) {
   if (!this->IsRoot()) return;
   const auto [width, height] = this->PictureSize();

@@ -82,6 +82,9 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkVDIProperties 
   void EndView();
   int GetOutdated();
   ///@}
+  /// Invoked when an update in the middle of another one, which a timer has requested, has given the last
+  /// VDI. After the other update and Release, the next one gives the requested VDI.
+  static constexpr unsigned long PutOffEvent = 1000 + 5646;  // vtkCommand::UserEvent and any number
   /// The preparation's progress in percent, 100 once its output is ready. -1 if there is no preparation: none
   /// was begun, it was given up, it failed, or it is impossible (before the first update, and with
   /// PictureOnly).
@@ -117,6 +120,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkVDIProperties 
   pv::FrameInputs ShownFrame(const pv::Shown& shown);
   pv::Origin OriginOf(vtkDataObject* input);
   bool TakePreparation(const pv::Origin& origin, vtkImageData* output);
+  int GiveMade(const pv::Origin& origin, vtkImageData* output);
+  int PutOff(vtkImageData* output);
   int EndWithout(const std::exception_ptr& failure, vtkImageData* output);
   void SayFailure(const std::string& what);
   void TakeReport();

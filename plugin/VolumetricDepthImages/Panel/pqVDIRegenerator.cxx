@@ -23,6 +23,7 @@
 
 #include "VDIViews.h"
 #include "vtkSMVDIGeneratorProxy.h"
+#include "vtkVDIGenerator.h"
 #include "vtkVDIRepresentation.h"
 
 namespace {
@@ -77,6 +78,9 @@ pqVDIRegenerator::pqVDIRegenerator(pqPipelineSource* source) : QObject(source), 
                 &pqVDIRegenerator::lookWhetherViewsWait);
   this->connect(model, &pqServerManagerModel::proxyAdded, this, &pqVDIRegenerator::proxyAdded);
   for (pqAnimationScene* scene : model->findItems<pqAnimationScene*>()) this->proxyAdded(scene);
+  // Without a server, the filter is in this process, and the window's timers run while it shows its progress.
+  if (auto* filter = vtkVDIGenerator::SafeDownCast(this->generator()->GetClientSideObject()))
+    pqCoreUtilities::connect(filter, vtkVDIGenerator::PutOffEvent, this, SLOT(drawSoon()));
   this->lookWhetherViewsWait();
 }
 
@@ -206,7 +210,11 @@ void pqVDIRegenerator::lookWhetherViewsWait() {
 void pqVDIRegenerator::viewUpdated() {
   if (this->Now != State::Idle || !this->Defers) return;
   auto* view = qobject_cast<pqView*>(this->sender());
-  if (view == nullptr || !this->isShownIn(view) || !this->generator()->IsOutdated()) return;
+  if (view != nullptr && this->isShownIn(view) && this->generator()->IsOutdated()) this->drawSoon();
+}
+
+void pqVDIRegenerator::drawSoon() {
+  if (this->Now != State::Idle) return;
   this->Now = State::Waiting;
   this->Rest = 0;
   this->Resting.start();

@@ -62,6 +62,7 @@ class pqVDIRegenerator : public QObject {
   Q_SLOT void lookWhetherViewsWait();
   Q_SLOT void proxyAdded(pqProxy* proxy);
   Q_SLOT void viewUpdated();
+  Q_SLOT void drawSoon();
 
   enum class State { Idle, Waiting, Preparing };
 
