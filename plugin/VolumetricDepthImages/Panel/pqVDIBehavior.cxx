@@ -14,11 +14,14 @@
 #include <vtkSMProxyManager.h>
 #include <vtkSMSession.h>
 #include <vtkSMTrace.h>
+#include <QCoreApplication>
+#include <QEvent>
 #include <QTimer>
 
 #include <initializer_list>
 #include <string_view>
 
+#include "VDISession.h"
 #include "VDIViewpoint.h"
 #include "pqVDIRegenerator.h"
 #include "pqVDISaveData.h"
@@ -44,6 +47,7 @@ bool isLoadedOn(pqServer* server) {
 void pqVDIBehavior::startup() {
   new pqVDIStillFrames(this);
   new pqVDISaveData(this);
+  QCoreApplication::instance()->installEventFilter(this);
   pqServerManagerModel* model = pqApplicationCore::instance()->getServerManagerModel();
   this->connect(model, &pqServerManagerModel::sourceAdded, this, &pqVDIBehavior::sourceAdded);
   for (pqPipelineSource* source : model->findItems<pqPipelineSource*>()) this->sourceAdded(source);
@@ -55,6 +59,13 @@ void pqVDIBehavior::startup() {
   this->connect(pqApplicationCore::instance()->getPluginManager(), &pqPluginManager::pluginsUpdated, this,
                 &pqVDIBehavior::lookAtServers, Qt::QueuedConnection);
   this->lookAtServers();
+}
+
+bool pqVDIBehavior::eventFilter(QObject* watched, QEvent* event) {
+  // ParaView's progress bar lets timers run in the middle of an update, and some draw views. VTK's pipelines
+  // and ParaView's views don't survive an update within an update. A timer that lost its event fires again.
+  if (event->type() == QEvent::Timer && pv::RunningUpdate::exists()) return true;
+  return QObject::eventFilter(watched, event);
 }
 
 /// Called when a user has made the filter from the menu.
@@ -83,6 +94,7 @@ void pqVDIBehavior::lookAtServers() {
 }
 
 void pqVDIBehavior::shutdown() {
+  if (QCoreApplication::instance() != nullptr) QCoreApplication::instance()->removeEventFilter(this);
   // Deletes pqVDIStillFrames here: the list of views that it empties no longer exists at this object's end.
   delete this->findChild<pqVDIStillFrames*>();
   // The sources own the objects that this one has made.

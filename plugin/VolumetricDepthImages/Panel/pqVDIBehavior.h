@@ -1,6 +1,7 @@
 // Starts with the plugin. It gives each VolumetricDepthImage of the pipeline a pqVDIRegenerator, has still
 // frames deferred, has views follow each VDIStream, moves the view to the viewpoint of the VDI that the user
-// opens, and warns of servers that lack the plugin.
+// opens, warns of servers that lack the plugin, and has timers wait while the window's own process makes a
+// VDI.
 #ifndef pqVDIBehavior_h
 #define pqVDIBehavior_h
 
@@ -18,6 +19,10 @@ class pqVDIBehavior : public QObject {
  public:
   void startup();
   void shutdown();
+
+ protected:
+  /// Watches all objects, because timers of any of them draw views.
+  bool eventFilter(QObject* watched, QEvent* event) override;
 
  private:
   Q_SLOT void sourceAdded(pqPipelineSource* source);
