@@ -185,6 +185,11 @@ def log_error(text):
     vtkLogger.Log(vtkLogger.VERBOSITY_ERROR, "script", 0, text)
 
 
+def log_warning(text):
+    from vtkmodules.vtkCommonCore import vtkLogger
+    vtkLogger.Log(vtkLogger.VERBOSITY_WARNING, "script", 0, text)
+
+
 class Loading:
     """The script that is being loaded, and what the loaded ones have made."""
 
@@ -249,13 +254,12 @@ class Extracts:
         """Reports, once for each extractor, that the simulation hands over none of the step numbers that its trigger takes.
         As many consecutive steps as the trigger's frequency would include one."""
         from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
-        from vtkmodules.vtkCommonCore import vtkLogger
         step = helper.GetTimeStep()
         taking = {extractor.SMProxy.GetGlobalID() for extractor in due}
         for extractor in enabled_extractors():
             trigger, key = extractor.Trigger, extractor.SMProxy.GetGlobalID()
             missed = self.missed.setdefault(key, Missed())
-            if key in taking or trigger is None or trigger.GetXMLName() != "TimeStep":
+            if key in taking or not counts_steps(trigger):
                 missed.is_over = True
             if missed.is_over or step == missed.last or not is_between(trigger, step):
                 continue
@@ -263,9 +267,9 @@ class Extracts:
             missed.count += 1
             if missed.count == trigger.Frequency:
                 missed.is_over = True
-                vtkLogger.Log(vtkLogger.VERBOSITY_WARNING, "script", 0, "the extractor of '%s' has written nothing in %d "
-                              "steps: its trigger's frequency counts step numbers, and the simulation handed over none of %s"
-                              % (extractor.Writer.FileName, missed.count, steps_of(trigger)))
+                log_warning("the extractor of '%s' has written nothing in %d steps: its trigger's frequency counts step "
+                            "numbers, and the simulation handed over none of %s" %
+                            (extractor.Writer.FileName, missed.count, steps_of(trigger)))
 
     def leave_out_same_files(self, due):
         """Returns the extractors without those that would replace another one's file in this step; reports and disables
@@ -283,7 +287,6 @@ class Extracts:
     def tell_of_older_files(self, due):
         """Reports, once for each extractor, that it replaces files of an earlier run."""
         from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
-        from vtkmodules.vtkCommonCore import vtkLogger
         for extractor in due:
             key, name = extractor.SMProxy.GetGlobalID(), extractor.Writer.FileName
             try:
@@ -293,8 +296,7 @@ class Extracts:
             file = os.path.join(self.loading.folder_of(extractor), name)
             if key not in self.told_of and self.last_files.get(key) != file and os.path.isfile(file):
                 self.told_of.add(key)
-                vtkLogger.Log(vtkLogger.VERBOSITY_WARNING, "script", 0, "'%s' is an earlier run's file; this run replaces it "
-                              "and the others of its kind" % file)
+                log_warning("'%s' is an earlier run's file; this run replaces it and the others of its kind" % file)
             self.last_files[key] = file
 
 
@@ -366,7 +368,7 @@ def due_extractors(step=None, time=None):
     def due(extractor):
         trigger = extractor.Trigger
         # Other triggers count how often they are asked.
-        return trigger is None or trigger.GetXMLName() != "TimeStep" or controller.IsTriggerActivated(extractor.SMProxy)
+        return not counts_steps(trigger) or controller.IsTriggerActivated(extractor.SMProxy)
 
     return [extractor for extractor in enabled_extractors() if due(extractor)]
 
@@ -376,6 +378,10 @@ def enabled_extractors():
     extractors = servermanager.ProxyManager().GetProxiesInGroup("extractors").values()
     return [extractor for extractor in extractors
             if servermanager.vtkSMExtractsController.IsExtractorEnabled(extractor.SMProxy)]
+
+
+def counts_steps(trigger):
+    return trigger is not None and trigger.GetXMLName() == "TimeStep"
 
 
 def is_between(trigger, step):

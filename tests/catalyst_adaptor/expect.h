@@ -43,19 +43,19 @@ static inline int initialize_any(const char* what, vdi_catalyst** catalyst) {
                          : vdi_catalyst_initialize_json(comm, what, catalyst);
 }
 
-/* The resident memory of a process, in KiB; 0 stands for this process. */
+/* The resident memory of a process, in KiB. */
 static inline long resident_kib_of(pid_t process) {
   char path[40];
-  if (process != 0) snprintf(path, sizeof path, "/proc/%d/statm", (int)process);
+  snprintf(path, sizeof path, "/proc/%d/statm", (int)process);
   long pages = 0;
-  FILE* file = fopen(process != 0 ? path : "/proc/self/statm", "r");
+  FILE* file = fopen(path, "r");
   if (file == NULL || fscanf(file, "%*d %ld", &pages) != 1) abort();
   fclose(file);
   return pages * (sysconf(_SC_PAGESIZE) / 1024);
 }
 
 static inline long resident_kib(void) {
-  return resident_kib_of(0);
+  return resident_kib_of(getpid());
 }
 
 /* These functions return 1, and say why, if a code isn't the expected one. */
