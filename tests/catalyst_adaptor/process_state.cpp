@@ -239,9 +239,8 @@ int main(int argc, char** argv) {
   const std::string what = argv[1];
   const bool isScript = what.ends_with(".py");
   const MPI_Fint comm = MPI_Comm_c2f(MPI_COMM_WORLD);
-  if (!isScript)
-    std::filesystem::current_path(std::getenv("VDI_OUTPUT"));  // a script names the folder itself
-  if (isScript) std::filesystem::current_path("/");
+  // A script names the folder of its VDIs itself; a run without one writes to the current folder.
+  std::filesystem::current_path(isScript ? "/" : std::getenv("VDI_OUTPUT"));
   makeOwnSettings();
   const State before = stateOfProcess();
 

@@ -21,7 +21,7 @@ namespace {
 /// The most bytes staged at a time with Kind::Alone. Uploads up to this size continue after `load` returns.
 constexpr std::uint64_t aloneBytes = std::uint64_t{128} << 20;
 /// The most bytes staged at a time with Kind::DuringRenders. A render waits for the part under way.
-constexpr std::uint64_t besideBytes = std::uint64_t{2} << 20;
+constexpr std::uint64_t duringRendersBytes = std::uint64_t{2} << 20;
 
 }  // namespace
 
@@ -155,7 +155,7 @@ template <typename Segment>
 void VdiLoader::loadLists(const ListsOf<Segment>& lists, Kind kind) {
   const std::uint64_t bytes =
       (lists.offsets.size() + 4) * sizeof(std::uint32_t) + lists.segments.size() * sizeof(Segment);
-  stagingBytes_ = std::min(bytes, kind == Kind::Alone ? aloneBytes : besideBytes);
+  stagingBytes_ = std::min(bytes, kind == Kind::Alone ? aloneBytes : duringRendersBytes);
   staging_.reserve(device_, stagingBytes_, MemoryKind::Upload);
   stagingUsed_ = 0;
   commands_.begin();
