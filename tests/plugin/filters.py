@@ -5,6 +5,8 @@ import os
 
 import numpy as np
 from pvtest import *  # noqa: F403
+from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonDataModel import vtkFieldData
 from vtkmodules.vtkRenderingCore import vtkCamera
 
 POSITION, FOCAL_POINT = [60, 45, 75], [0, 0, 0]
@@ -56,6 +58,34 @@ check(growth >= 4 and abs(larger[14] / last[14] / growth - 1) < 0.1,
 image.Resolution, image.Margin, image.Precision = [120, 90], 0, 1
 image.UpdatePipeline()
 check(last_vdi(simple.VolumetricDepthImage(Input=wavelet)) == [0] * len(last), "without a VDI there is nothing to go by")
+
+
+def check_stored_ranges():
+    """ParaView's server asks a data set's field data for the ranges of all arrays after each update. These must be known then:
+    the test overwrites the values without a word to VTK, which would find other ranges in them."""
+    image = vdi_of(wavelet, Precision=0)
+    image.UpdatePipeline()
+    data = image.GetClientSideObject().GetOutputDataObject(0)
+    arrays = [data.GetPointData().GetArray(name) for name in ("RGBA", "SupersegmentCount")]
+    arrays += [data.GetFieldData().GetArray(name) for name in ("VDI.offsets", "VDI.supersegments")]
+    for array in arrays:
+        values = vtk_to_numpy(array)
+        values = values.reshape(len(values), -1)
+        lengths = np.linalg.norm(values.astype(float), axis=1)
+        expected = [(lengths.min(), lengths.max())] if values.shape[1] > 1 else []
+        expected += [(column.min(), column.max()) for column in values.T]
+        values[...] = 0
+        fresh = vtkFieldData()
+        fresh.AddArray(array)
+        components = range(-1 if values.shape[1] > 1 else 0, values.shape[1])
+        for find in (fresh.GetRange, fresh.GetFiniteRange):
+            found = [[0, 0] for _ in components]
+            for component, pair in zip(components, found):
+                find(array.GetName(), pair, component)
+            check(np.allclose(found, expected, rtol=1e-6), "the ranges of %s are stored with it" % array.GetName())
+
+
+check_stored_ranges()
 
 # Saved, read again, rendered: the same.
 path = os.path.join(OUTPUT, "wavelet.vdi")

@@ -37,7 +37,7 @@ constexpr const char* waitingName = "VDI.waiting";
 
 template <typename Array>
 auto* addField(vtkFieldData* fields, const char* name, int components, vtkIdType tuples) {
-  vtkNew<Array> array;
+  vtkNew<Ranged<Array>> array;
   array->SetName(name);
   array->SetNumberOfComponents(components);
   array->SetNumberOfTuples(tuples);
@@ -47,7 +47,7 @@ auto* addField(vtkFieldData* fields, const char* name, int components, vtkIdType
 
 /// Adds the image's colours, 4 bytes a pixel, and returns their memory.
 unsigned char* addColors(vtkImageData* image, std::size_t pixels) {
-  vtkNew<vtkUnsignedCharArray> colors;
+  vtkNew<Ranged<vtkUnsignedCharArray>> colors;
   colors->SetName("RGBA");
   colors->SetNumberOfComponents(4);
   colors->SetNumberOfTuples(static_cast<vtkIdType>(pixels));
@@ -61,7 +61,7 @@ void hide(vtkAbstractArray* array) {
 }
 
 void addDepth(vtkImageData* image, std::span<const float> depths) {
-  vtkNew<vtkFloatArray> array;
+  vtkNew<Ranged<vtkFloatArray>> array;
   array->SetName("Depth");
   array->SetNumberOfTuples(static_cast<vtkIdType>(depths.size()));
   vdi::copyInParallel(std::as_bytes(depths), array->GetPointer(0));
@@ -153,7 +153,7 @@ void setVdi(vtkImageData* image, const vdi::Vdi& vdi) {
 
 void setVdi(vtkImageData* image, const vdi::Vdi& vdi, const vdi::Image& flat) {
   setPicture(image, flat, false);
-  vtkNew<vtkUnsignedIntArray> counts;
+  vtkNew<Ranged<vtkUnsignedIntArray>> counts;
   counts->SetName("SupersegmentCount");
   const auto& offsets = vdi.offsets();
   const glm::ivec2 picture = vdi.pictureSize();

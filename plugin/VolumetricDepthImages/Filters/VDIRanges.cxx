@@ -99,4 +99,22 @@ void rememberRanges(vtkDataArray* array) {
   }
 }
 
+bool recallRanges(vtkDataArray* array, vtkInformationInformationVectorKey* components, double* ranges) {
+  vtkInformationVector* stored = array->HasInformation() ? array->GetInformation()->Get(components) : nullptr;
+  const int count = array->GetNumberOfComponents();
+  if (stored == nullptr || stored->GetNumberOfInformationObjects() != count) return false;
+  for (int c = 0; c < count; ++c) {
+    vtkInformation* info = stored->GetInformationObject(c);
+    if (!info->Has(vtkDataArray::COMPONENT_RANGE())) return false;
+    info->Get(vtkDataArray::COMPONENT_RANGE(), ranges + 2 * std::ptrdiff_t{c});
+  }
+  return true;
+}
+
+bool recallRange(vtkDataArray* array, vtkInformationDoubleVectorKey* length, double range[2]) {
+  if (!array->HasInformation() || !array->GetInformation()->Has(length)) return false;
+  array->GetInformation()->Get(length, range);
+  return true;
+}
+
 }  // namespace pv
