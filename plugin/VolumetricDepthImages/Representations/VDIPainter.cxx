@@ -1,5 +1,6 @@
 #include "VDIPainter.h"
 
+#include <vtkObject.h>  // the next header needs it unless NDEBUG is defined
 #include <vtkOpenGLError.h>
 #include <vtkOpenGLFramebufferObject.h>
 #include <vtkOpenGLQuadHelper.h>
