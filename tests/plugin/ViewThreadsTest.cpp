@@ -163,7 +163,7 @@ TEST_CASE("a piece with a problem leaves no load behind, and the next VDI shows"
   }
 }
 
-TEST_CASE("files are read ahead, also ones that change or that nobody asks for") {
+TEST_CASE("files are read ahead, also ones that nobody asks for") {
   const vdi::test::TemporaryFolder folder;
   std::vector<std::string> names;
   std::vector<std::size_t> counts;

@@ -61,8 +61,9 @@ check(last_vdi(simple.VolumetricDepthImage(Input=wavelet)) == [0] * len(last), "
 
 
 def check_stored_ranges():
-    """ParaView's server asks a data set's field data for the ranges of all arrays after each update. These must be known then:
-    the test overwrites the values without a word to VTK, which would find other ranges in them."""
+    """ParaView's server asks a data set's field data for the ranges of all arrays after each update.
+    These must be known then. The test overwrites the values without telling VTK, which would find
+    other ranges in them."""
     image = vdi_of(wavelet, Precision=0)
     image.UpdatePipeline()
     data = image.GetClientSideObject().GetOutputDataObject(0)
