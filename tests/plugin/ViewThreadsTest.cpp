@@ -163,6 +163,36 @@ TEST_CASE("a piece with a problem leaves no load behind, and the next VDI shows"
   }
 }
 
+TEST_CASE("buffers that are given back don't wait for a load") {
+  const vtkSmartPointer<vtkPolyData> piece = pieceOf(vdi::test::noisyVdi(1280, 720, 12, 1));
+  pv::VDIBuffers buffers;
+  buffers.load(piece);  // the first load opens the device
+  while (buffers.isLoading()) buffers.take(100ms);
+  REQUIRE(buffers.hasVdi());
+  buffers.load(piece);
+  Clock::time_point start = Clock::now();
+  while (buffers.isLoading()) buffers.take(100ms);
+  const Clock::duration loading = Clock::now() - start;
+
+  buffers.load(piece);
+  start = Clock::now();
+  buffers.clear();
+  CHECK(Clock::now() - start < loading / 4);
+  CHECK_FALSE(buffers.hasVdi());
+  CHECK_FALSE(buffers.isLoading());
+
+  // The next VDI doesn't wait for the one that nobody wants.
+  buffers.load(pieceOf(vdiOfStep(1)));
+  while (buffers.isLoading()) buffers.take(100ms);
+  CHECK(buffers.hasVdi());
+
+  auto deleted = std::make_unique<pv::VDIBuffers>();
+  deleted->load(piece);
+  start = Clock::now();
+  deleted.reset();
+  CHECK(Clock::now() - start < loading / 4);
+}
+
 TEST_CASE("files are read ahead, also ones that nobody asks for") {
   const vdi::test::TemporaryFolder folder;
   std::vector<std::string> names;

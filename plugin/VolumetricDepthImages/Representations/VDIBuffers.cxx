@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "VDIPiece.h"
+#include "VDIRetire.h"
 #include "VDISession.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Thinning.h"
@@ -30,17 +31,27 @@ void VDIBuffers::Renderers::compileForMovement() {
                          [renderer = whole.get()] { renderer->compile(vdi::Reconstruction::Smooth); });
 }
 
+bool VDIBuffers::Renderers::areBusy() const {
+  return compiling.valid() && compiling.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
+}
+
 VDIBuffers::~VDIBuffers() {
   this->clear();
 }
 
+/// A load waits for the device, which may be making a VDI for seconds. The window doesn't wait for either.
+void VDIBuffers::leaveRenderers() {
+  auto left = std::make_shared<Left>();
+  left->renderers = std::exchange(renderers_, std::make_shared<Renderers>());
+  left->loading = std::exchange(loading_, nullptr);
+  left->job = std::exchange(job_, {});
+  if (left->job.valid() || left->renderers->areBusy()) pv::retire(std::move(left));
+}
+
 void VDIBuffers::clear() {
-  if (job_.valid()) job_.wait();
-  job_ = {};
-  loading_ = nullptr;
   waiting_ = nullptr;
   still_.drop();
-  renderers_ = std::make_shared<Renderers>();
+  this->leaveRenderers();
   hasVdi_ = false;
   isEmpty_ = false;
   ++version_;
@@ -123,7 +134,7 @@ void VDIBuffers::takeOne() {
     hasVdi_ = false;
     const bool vdiIsAtFault =
         error.code() == vdi::ErrorCode::Format || error.code() == vdi::ErrorCode::InvalidArgument;
-    if (!vdiIsAtFault) renderers_ = std::make_shared<Renderers>();
+    if (!vdiIsAtFault) this->leaveRenderers();
     this->startNext();
     throw;
   } catch (...) {

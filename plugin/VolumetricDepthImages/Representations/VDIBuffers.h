@@ -25,7 +25,7 @@ namespace pv {
 class VDIBuffers {
  public:
   VDIBuffers() = default;
-  ~VDIBuffers();  // waits for a load that is under way, as clear does
+  ~VDIBuffers();  // as clear
   VDIBuffers(const VDIBuffers&) = delete;
   VDIBuffers& operator=(const VDIBuffers&) = delete;
   VDIBuffers(VDIBuffers&&) = delete;
@@ -42,7 +42,8 @@ class VDIBuffers {
   /// Whether a newer VDI than the one shown is being loaded, and whether `take` would show it at once.
   bool isLoading() const { return job_.valid(); }
   bool hasLoaded() const;
-  /// Shows nothing and gives the device back.
+  /// Shows nothing and gives the device back. A load that is under way ends on another thread, and the device
+  /// is given back then.
   void clear();
 
   bool hasVdi() const { return hasVdi_; }
@@ -78,6 +79,7 @@ class VDIBuffers {
     bool isOnCpu = false;
     std::future<void> compiling;  // its destructor waits
     void compileForMovement();
+    bool areBusy() const;
   };
   struct Loaded {
     bool hasVdi = false;
@@ -87,10 +89,17 @@ class VDIBuffers {
     std::array<Thin, thinLevels> thins{};
     std::optional<vdi::Vdi> tooLarge;  // the device has no memory for a second buffer
   };
+  /// A load that nobody waits for. The last member's destructor waits, before the others are destroyed.
+  struct Left {
+    std::shared_ptr<Renderers> renderers;
+    vtkSmartPointer<vtkFieldData> loading;
+    std::future<Loaded> job;
+  };
   static Loaded loaded(vtkFieldData* fields, Renderers& renderers);
   static Thin loadThin(const vdi::Vdi& vdi, int width, std::unique_ptr<vdi::VdiRenderer>& renderer);
   void startNext();
   void takeOne();
+  void leaveRenderers();
 
   std::shared_ptr<Renderers> renderers_ = std::make_shared<Renderers>();
   bool hasVdi_ = false;
@@ -100,7 +109,7 @@ class VDIBuffers {
   std::optional<vdi::View> viewpoint_;
   std::array<Thin, thinLevels> thins_{};
   std::future<Loaded> job_;
-  vtkSmartPointer<vtkFieldData> loading_;  // read by the job, released on this thread
+  vtkSmartPointer<vtkFieldData> loading_;  // read by the job
   vtkSmartPointer<vtkFieldData> waiting_;
   VDIStill still_;  // declared after the renderers that it uses, so that it is destroyed before them
 };
