@@ -1,28 +1,43 @@
-# The examples on one rank and on four. Each runs with the adaptor and without it. Its result is the same both times, bit for
-# bit, and on any number of ranks. An example is skipped if its Debian package is missing.
+# The examples on one rank and on four, and, as a long test, with frames made in separate processes. Each runs with the adaptor
+# and without it. Its result is the same both times, bit for bit, and on any number of ranks. An example is skipped if its
+# Debian package is missing.
 set(examplesTest "${CMAKE_CURRENT_SOURCE_DIR}/examples.py")
 set(examplesFolder "${CMAKE_SOURCE_DIR}/catalyst_adaptor/examples")
 
+# vdi_compare_examples(<test> <folder> <one> <other>): compares the runs of two tests, which must have run.
+function(vdi_compare_examples test folder one other)
+  add_test(
+    NAME ${test}
+    COMMAND "${Python3_EXECUTABLE}" "${examplesTest}" compare "${examplesFolder}/${folder}/vdi.json" ${one} ${other}
+    WORKING_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}")
+  vdi_test_properties(${test} TIMEOUT 60 LABELS paraview ENVIRONMENT "PYTHONPATH=${CMAKE_BINARY_DIR}/python")
+  set_tests_properties(${test} PROPERTIES FIXTURES_REQUIRED "${one}_done;${other}_done")
+endfunction()
+
 # vdi_add_example_test(<folder> program...)
 function(vdi_add_example_test folder)
-  foreach(ranks 1 4)
-    set(name example_${folder}_np${ranks})
+  set(example example_${folder})
+  foreach(run np1 np4 isolated)
+    set(name ${example}_${run})
+    set(ranks 4)
+    set(variables "PYTHONPATH=${CMAKE_BINARY_DIR}/python")
+    if(run STREQUAL np1)
+      set(ranks 1)
+    elseif(run STREQUAL isolated)
+      list(APPEND variables VDI_ISOLATION=process)
+    endif()
     add_test(
       NAME ${name}
       COMMAND
         ${CMAKE_COMMAND} -E env --unset=DISPLAY "${Python3_EXECUTABLE}" "${examplesTest}" run
         "${CMAKE_CURRENT_BINARY_DIR}/${name}" "${examplesFolder}/${folder}/vdi.json" "${MPIEXEC_EXECUTABLE}" --oversubscribe
         ${MPIEXEC_NUMPROC_FLAG} ${ranks} ${ARGN})
-    vdi_test_properties(${name} TIMEOUT 120 LABELS paraview ENVIRONMENT "PYTHONPATH=${CMAKE_BINARY_DIR}/python")
-    set_tests_properties(${name} PROPERTIES FIXTURES_SETUP example_${folder})
+    vdi_test_properties(${name} TIMEOUT 120 LABELS paraview ENVIRONMENT ${variables})
+    set_tests_properties(${name} PROPERTIES FIXTURES_SETUP ${name}_done)
   endforeach()
-  add_test(
-    NAME example_${folder}_ranks
-    COMMAND "${Python3_EXECUTABLE}" "${examplesTest}" compare "${examplesFolder}/${folder}/vdi.json" example_${folder}_np1
-            example_${folder}_np4
-    WORKING_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}")
-  vdi_test_properties(example_${folder}_ranks TIMEOUT 60 LABELS paraview ENVIRONMENT "PYTHONPATH=${CMAKE_BINARY_DIR}/python")
-  set_tests_properties(example_${folder}_ranks PROPERTIES FIXTURES_REQUIRED example_${folder})
+  vdi_compare_examples(${example}_ranks ${folder} ${example}_np1 ${example}_np4)
+  vdi_compare_examples(${example}_isolated_same ${folder} ${example}_np4 ${example}_isolated)
+  set_tests_properties(${example}_isolated ${example}_isolated_same PROPERTIES LABELS "paraview;long")
   add_test(NAME example_${folder}_json COMMAND $<TARGET_FILE:vdi_tool> check "${examplesFolder}/${folder}/vdi.json")
   vdi_test_properties(example_${folder}_json TIMEOUT 20 LABELS paraview)
 endfunction()
