@@ -164,7 +164,7 @@ TEST_CASE("a piece with a problem leaves no load behind, and the next VDI shows"
 }
 
 TEST_CASE("buffers that are given back don't wait for a load") {
-  const vtkSmartPointer<vtkPolyData> piece = pieceOf(vdi::test::noisyVdi(1280, 720, 12, 1));
+  const vtkSmartPointer<vtkPolyData> piece = pieceOf(vdi::test::noisyVdi(640, 480, 10, 1));
   pv::VDIBuffers buffers;
   buffers.load(piece);  // the first load opens the device
   while (buffers.isLoading()) buffers.take(100ms);

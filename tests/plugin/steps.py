@@ -12,12 +12,12 @@ from paraview import simple
 from pvtest import check
 from vtkmodules.vtkRenderingUI import vtkGenericRenderWindowInteractor
 
-SIZE, CAMERA, CENTER = [320, 180], [2.2, 1.4, 2.0], [0.5, 0.5, 0.5]
+SIZE, CAMERA, CENTER = [256, 144], [2.2, 1.4, 2.0], [0.5, 0.5, 0.5]
 FOLDER = os.path.join(pvtest.OUTPUT, "steps")
 KINDS, COUNT = 4, 20
 
 
-def make(kind, resolution="320x180", azimuth="0"):
+def make(kind, resolution="256x144", azimuth="0"):
     return pvtest.make_vdi(os.path.join(FOLDER, "kind_{}.vdi".format(kind)), "--field", "turbulence", "--seed", str(kind + 1),
                            "--size", "32x32x32", "--resolution", resolution, "--azimuth", azimuth)
 
