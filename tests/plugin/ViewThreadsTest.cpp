@@ -163,10 +163,47 @@ TEST_CASE("a piece with a problem leaves no load behind, and the next VDI shows"
   }
 }
 
+TEST_CASE("a piece with the VDI of the last one loads nothing, unless that load failed") {
+  pv::VDIBuffers buffers;
+  const vtkSmartPointer<vtkPolyData> piece = pieceOf(vdiOfStep(1));
+  buffers.load(piece);
+  while (buffers.isLoading()) buffers.take(100ms);
+  REQUIRE(buffers.hasVdi());
+  const std::uint64_t version = buffers.version();
+  // While the next VDI is made, the same arrays come in another data object, with a mark or other values.
+  vtkNew<vtkPolyData> again;
+  again->ShallowCopy(piece);
+  pv::markFiltered(again);
+  buffers.load(again);
+  CHECK_FALSE(buffers.isLoading());
+  CHECK(buffers.version() == version);
+
+  buffers.load(pieceOf(vdiOfStep(2)));
+  buffers.load(piece);  // replaces the one that waits
+  while (buffers.isLoading()) buffers.take(100ms);
+  CHECK(buffers.version() > version);
+
+  vtkNew<vtkPolyData> problem;
+  pv::packProblem("no VDI", problem);
+  for (int round = 0; round < 2; ++round) {
+    buffers.load(problem);
+    CHECK(buffers.isLoading());
+    CHECK_THROWS(buffers.take(std::chrono::seconds(60)));
+  }
+  buffers.load(piece);
+  while (buffers.isLoading()) buffers.take(100ms);
+  CHECK(buffers.hasVdi());
+  buffers.clear();
+  buffers.load(piece);
+  while (buffers.isLoading()) buffers.take(100ms);
+  CHECK(buffers.hasVdi());
+}
+
 TEST_CASE("buffers that are given back don't wait for a load") {
   const vtkSmartPointer<vtkPolyData> piece = pieceOf(vdi::test::noisyVdi(640, 480, 10, 1));
+  const vtkSmartPointer<vtkPolyData> other = pieceOf(vdi::test::noisyVdi(640, 480, 10, 2));
   pv::VDIBuffers buffers;
-  buffers.load(piece);  // the first load opens the device
+  buffers.load(other);  // the first load opens the device
   while (buffers.isLoading()) buffers.take(100ms);
   REQUIRE(buffers.hasVdi());
   buffers.load(piece);
@@ -174,7 +211,7 @@ TEST_CASE("buffers that are given back don't wait for a load") {
   while (buffers.isLoading()) buffers.take(100ms);
   const Clock::duration loading = Clock::now() - start;
 
-  buffers.load(piece);
+  buffers.load(other);
   start = Clock::now();
   buffers.clear();
   CHECK(Clock::now() - start < loading / 4);

@@ -50,6 +50,7 @@ void VDIBuffers::leaveRenderers() {
 
 void VDIBuffers::clear() {
   waiting_ = nullptr;
+  newest_.clear();
   still_.drop();
   this->leaveRenderers();
   hasVdi_ = false;
@@ -58,7 +59,11 @@ void VDIBuffers::clear() {
 }
 
 void VDIBuffers::load(vtkDataObject* piece) {
-  // The next VDI comes in the same data object, but in other arrays.
+  // While a VDI is being made, the filter gives the last one again, in the same arrays. The next VDI comes
+  // in the same data object, but in other arrays.
+  PieceContent content = contentOf(piece->GetFieldData());
+  if (!content.empty() && content == newest_) return;
+  newest_ = std::move(content);
   waiting_ = vtkSmartPointer<vtkFieldData>::New();
   waiting_->ShallowCopy(piece->GetFieldData());
   if (!job_.valid()) this->startNext();
@@ -132,6 +137,7 @@ void VDIBuffers::takeOne() {
     }
   } catch (const vdi::Error& error) {
     hasVdi_ = false;
+    if (waiting_ == nullptr) newest_.clear();
     const bool vdiIsAtFault =
         error.code() == vdi::ErrorCode::Format || error.code() == vdi::ErrorCode::InvalidArgument;
     if (!vdiIsAtFault) this->leaveRenderers();
@@ -139,6 +145,7 @@ void VDIBuffers::takeOne() {
     throw;
   } catch (...) {
     hasVdi_ = false;
+    if (waiting_ == nullptr) newest_.clear();
     this->startNext();
     throw;
   }

@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 
+#include "VDIPiece.h"
 #include "VDIStill.h"
 #include "vdi/core/Vdi.h"
 #include "vdi/pipeline/VdiRenderer.h"
@@ -32,7 +33,7 @@ class VDIBuffers {
   VDIBuffers& operator=(VDIBuffers&&) = delete;
 
   /// Starts to load the VDI of a piece (VDIPiece.h). While an earlier one is being loaded, the piece waits,
-  /// and replaces a piece that waits already.
+  /// and replaces a piece that waits already. Loads nothing if the newest piece had the same VDI.
   void load(vtkDataObject* piece);
   /// Shows the newest VDI that has been loaded, starts to load a waiting piece, and returns whether the VDI
   /// changed. Waits at most `wait` for the newest piece, then continues to show the last one. Throws
@@ -111,7 +112,8 @@ class VDIBuffers {
   std::future<Loaded> job_;
   vtkSmartPointer<vtkFieldData> loading_;  // read by the job
   vtkSmartPointer<vtkFieldData> waiting_;
-  VDIStill still_;  // declared after the renderers that it uses, so that it is destroyed before them
+  PieceContent newest_;  // that of the last piece; empty if its load failed
+  VDIStill still_;       // declared after the renderers that it uses, so that it is destroyed before them
 };
 
 }  // namespace pv

@@ -1,5 +1,6 @@
 #include "VDIPiece.h"
 
+#include <vtkAbstractArray.h>
 #include <vtkDataArray.h>
 #include <vtkDoubleArray.h>
 #include <vtkFieldData.h>
@@ -15,6 +16,7 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "VDIImageData.h"
 #include "vdi/core/Error.h"
@@ -115,6 +117,16 @@ bool boundsOf(vtkFieldData* fields, double bounds[6]) {
   if (array == nullptr || array->GetNumberOfValues() != 6) return false;
   std::copy_n(array->GetPointer(0), 6, bounds);
   return bounds[0] <= bounds[1] && bounds[2] <= bounds[3] && bounds[4] <= bounds[5];
+}
+
+PieceContent contentOf(vtkFieldData* fields) {
+  PieceContent content;
+  for (int i = 0; i < fields->GetNumberOfArrays(); ++i) {
+    vtkAbstractArray* array = fields->GetAbstractArray(i);
+    const std::string_view name(array->GetName() != nullptr ? array->GetName() : "");
+    if (name.starts_with("VDI.") && name != filterName) content.emplace_back(array, array->GetMTime());
+  }
+  return content;
 }
 
 std::optional<vdi::Vdi> unpackVdi(vtkFieldData* fields) {

@@ -10,11 +10,16 @@
 #ifndef VDIPiece_h
 #define VDIPiece_h
 
+#include <vtkType.h>
+
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "vdi/core/Vdi.h"
 
+class vtkAbstractArray;
 class vtkDataObject;
 class vtkFieldData;
 class vtkPolyData;
@@ -41,6 +46,10 @@ bool isFiltered(vtkFieldData* fields);
 /// Gets the world bounds, in VTK's order, from a piece's field data. Returns false if it has no VDI with a
 /// scene.
 bool boundsOf(vtkFieldData* fields, double bounds[6]);
+/// The arrays of the VDI in a piece's field data, each with its modification time. Two pieces with the same
+/// content have the same VDI.
+using PieceContent = std::vector<std::pair<const vtkAbstractArray*, vtkMTimeType>>;
+PieceContent contentOf(vtkFieldData* fields);
 /// Returns the VDI in a piece's field data; nullopt if there is none, or another rank has it. Any thread may
 /// call it. Throws vdi::Error for a VDI that isn't sound, and for a problem.
 std::optional<vdi::Vdi> unpackVdi(vtkFieldData* fields);
