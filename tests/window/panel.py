@@ -18,6 +18,8 @@ path = functools.partial(os.path.join, OUTPUT)
 # were made in the background, and 0.5 to 1.3 s before still frames were. Two cores with nothing else to
 # do take 0.2 s now.
 ANSWER_SECONDS = 1.0
+# After Delete, ParaView also makes the panels of what is left. window_beside allows as much.
+DELETE_SECONDS = 1.25
 LOAD = """
 from paraview import simple
 simple.LoadDistributedPlugin("VolumetricDepthImages", remote=False, ns=globals())
@@ -150,7 +152,7 @@ def delete(window, button, what):
         window.click(button)
         time.sleep(1)
     print("Delete while %s is made: the window took at most %.3f s to answer" % (what, pulse.longest), flush=True)
-    check(pulse.longest <= ANSWER_SECONDS, "Delete doesn't freeze the window while %s is made" % what)
+    check(pulse.longest <= DELETE_SECONDS, "Delete doesn't freeze the window while %s is made" % what)
 
 
 def first_session(window):

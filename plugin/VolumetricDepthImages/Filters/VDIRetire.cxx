@@ -1,6 +1,7 @@
 #include "VDIRetire.h"
 
 #include <chrono>
+#include <cstdlib>
 #include <future>
 #include <mutex>
 #include <system_error>
@@ -21,10 +22,22 @@ Retired& retired() {
   return shared;
 }
 
+void waitForRetired() {
+  std::vector<std::future<void>> jobs;
+  {
+    const std::scoped_lock lock(retired().mutex);
+    jobs.swap(retired().jobs);
+  }
+  for (const std::future<void>& job : jobs) job.wait();
+}
+
 }  // namespace
 
 void retire(std::shared_ptr<void> thing) {
   const std::scoped_lock lock(retired().mutex);
+  // Exit handlers run in reverse order: this one before those of libraries that the thing has used, for
+  // example OpenSSL's.
+  std::atexit(waitForRetired);
   std::erase_if(retired().jobs, [](const std::future<void>& job) {
     return job.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
   });
