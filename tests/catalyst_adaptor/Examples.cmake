@@ -1,10 +1,11 @@
-# The examples on one rank and on four, and, as a long test, with frames made in separate processes. Each runs with the adaptor
-# and without it. Its result is the same both times, bit for bit, and on any number of ranks. An example is skipped if its
-# Debian package is missing.
+# The examples on one rank and on four, and, as a long test, with frames made in separate processes.
+# Each runs with the adaptor and without it. Its result is the same both times, bit for bit, and on
+# any number of ranks. An example is skipped if its Debian package is missing.
 set(examplesTest "${CMAKE_CURRENT_SOURCE_DIR}/examples.py")
 set(examplesFolder "${CMAKE_SOURCE_DIR}/catalyst_adaptor/examples")
 
-# vdi_compare_examples(<test> <folder> <one> <other>): compares the runs of two tests, which must have run.
+# vdi_compare_examples(<test> <folder> <one> <other>): compares the runs of two tests, which must
+# have run.
 function(vdi_compare_examples test folder one other)
   add_test(
     NAME ${test}

@@ -1,7 +1,8 @@
 #include "vdi/stream/ArrivingVdi.h"
 
-#include <chrono>
 #include <utility>
+
+#include "vdi/core/Ready.h"
 
 namespace vdi::stream {
 
@@ -11,7 +12,7 @@ void ArrivingVdi::add(std::span<const std::byte> bytes) {
   waiting_.insert(waiting_.end(), bytes.begin(), bytes.end());
   if (job_.valid()) {
     // If no thread could be started, the job is deferred, and finish runs it.
-    if (job_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+    if (!isReady(job_)) return;
     job_.get();
   }
   job_ = std::async(std::launch::async | std::launch::deferred,

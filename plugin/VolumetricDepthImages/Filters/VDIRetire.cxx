@@ -1,12 +1,13 @@
 #include "VDIRetire.h"
 
-#include <chrono>
 #include <cstdlib>
 #include <future>
 #include <mutex>
 #include <system_error>
 #include <utility>
 #include <vector>
+
+#include "vdi/core/Ready.h"
 
 namespace pv {
 
@@ -38,9 +39,7 @@ void retire(std::shared_ptr<void> thing) {
   // Exit handlers run in reverse order: this one before those of libraries that the thing has used, for
   // example OpenSSL's.
   std::atexit(waitForRetired);
-  std::erase_if(retired().jobs, [](const std::future<void>& job) {
-    return job.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
-  });
+  std::erase_if(retired().jobs, [](const std::future<void>& job) { return vdi::isReady(job); });
   try {
     retired().jobs.push_back(
         std::async(std::launch::async, [last = std::move(thing)]() mutable { last.reset(); }));

@@ -10,6 +10,7 @@
 #include "VDIRetire.h"
 #include "VDISession.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Ready.h"
 #include "vdi/core/Thinning.h"
 
 namespace pv {
@@ -32,7 +33,7 @@ void VDIBuffers::Renderers::compileForMovement() {
 }
 
 bool VDIBuffers::Renderers::areBusy() const {
-  return compiling.valid() && compiling.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
+  return compiling.valid() && !vdi::isReady(compiling);
 }
 
 VDIBuffers::~VDIBuffers() {
@@ -40,19 +41,19 @@ VDIBuffers::~VDIBuffers() {
 }
 
 /// A load waits for the device, which may be making a VDI for seconds. The window doesn't wait for either.
-void VDIBuffers::leaveRenderers() {
-  auto left = std::make_shared<Left>();
-  left->renderers = std::exchange(renderers_, std::make_shared<Renderers>());
-  left->loading = std::exchange(loading_, nullptr);
-  left->job = std::exchange(job_, {});
-  if (left->job.valid() || left->renderers->areBusy()) pv::retire(std::move(left));
+void VDIBuffers::abandonRenderers() {
+  auto abandoned = std::make_shared<Abandoned>();
+  abandoned->renderers = std::exchange(renderers_, std::make_shared<Renderers>());
+  abandoned->loading = std::exchange(loading_, nullptr);
+  abandoned->job = std::exchange(job_, {});
+  if (abandoned->job.valid() || abandoned->renderers->areBusy()) pv::retire(std::move(abandoned));
 }
 
 void VDIBuffers::clear() {
   waiting_ = nullptr;
   newest_.clear();
   still_.drop();
-  this->leaveRenderers();
+  this->abandonRenderers();
   hasVdi_ = false;
   isEmpty_ = false;
   ++version_;
@@ -136,24 +137,26 @@ void VDIBuffers::takeOne() {
       if (thins_[level].lists > 0) renderers_->thins[level]->showPrepared();
     }
   } catch (const vdi::Error& error) {
-    hasVdi_ = false;
-    if (waiting_ == nullptr) newest_.clear();
     const bool vdiIsAtFault =
         error.code() == vdi::ErrorCode::Format || error.code() == vdi::ErrorCode::InvalidArgument;
-    if (!vdiIsAtFault) this->leaveRenderers();
-    this->startNext();
+    if (!vdiIsAtFault) this->abandonRenderers();
+    this->continueAfterFailure();
     throw;
   } catch (...) {
-    hasVdi_ = false;
-    if (waiting_ == nullptr) newest_.clear();
-    this->startNext();
+    this->continueAfterFailure();
     throw;
   }
   this->startNext();
 }
 
+void VDIBuffers::continueAfterFailure() {
+  hasVdi_ = false;
+  if (waiting_ == nullptr) newest_.clear();
+  this->startNext();
+}
+
 bool VDIBuffers::hasLoaded() const {
-  return job_.valid() && job_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+  return vdi::isReady(job_);
 }
 
 bool VDIBuffers::take(Clock::duration wait) {

@@ -91,7 +91,7 @@ class VDIBuffers {
     std::optional<vdi::Vdi> tooLarge;  // the device has no memory for a second buffer
   };
   /// A load that nobody waits for. The last member's destructor waits, before the others are destroyed.
-  struct Left {
+  struct Abandoned {
     std::shared_ptr<Renderers> renderers;
     vtkSmartPointer<vtkFieldData> loading;
     std::future<Loaded> job;
@@ -100,7 +100,8 @@ class VDIBuffers {
   static Thin loadThin(const vdi::Vdi& vdi, int width, std::unique_ptr<vdi::VdiRenderer>& renderer);
   void startNext();
   void takeOne();
-  void leaveRenderers();
+  void continueAfterFailure();
+  void abandonRenderers();
 
   std::shared_ptr<Renderers> renderers_ = std::make_shared<Renderers>();
   bool hasVdi_ = false;

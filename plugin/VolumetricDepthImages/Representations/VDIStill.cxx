@@ -6,6 +6,8 @@
 #include <thread>
 #include <utility>
 
+#include "vdi/core/Ready.h"
+
 namespace pv {
 
 namespace {
@@ -69,7 +71,7 @@ void VDIStill::make(vdi::VdiRenderer& renderer) {
 }
 
 bool VDIStill::isBeingMade() const {
-  return job_.valid() && job_.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
+  return job_.valid() && !vdi::isReady(job_);
 }
 
 std::span<const glm::u8vec4> VDIStill::picture() {
