@@ -41,6 +41,15 @@ endfunction()
 set(VDI_TEST_ENVIRONMENT OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
                          OMPI_MCA_mpi_yield_when_idle=1 OMPI_MCA_btl_vader_single_copy_mechanism=none)
 
+# vdi_time_limit(<variable> seconds): sets the variable to a test's time limit. Sanitized code takes
+# several times as long, so the limit is ten times as long there.
+function(vdi_time_limit variable seconds)
+  if(VDI_SANITIZE)
+    math(EXPR seconds "10 * ${seconds}")
+  endif()
+  set(${variable} "${seconds}" PARENT_SCOPE)
+endfunction()
+
 # vdi_add_catch_test(core SOURCES ... LINK ... [RANKS 3] [LONG_RANKS 5] [TIMEOUT
 # seconds] [LABELS ...]): defines the program test_<name> with tests/Main.cpp (or tests/MpiMain.cpp
 # if RANKS is given), and a ctest for each of its cases or rank counts; see
@@ -50,6 +59,7 @@ function(vdi_add_catch_test name)
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
+  vdi_time_limit(arg_TIMEOUT "${arg_TIMEOUT}")
   add_executable(test_${name} ${arg_SOURCES})
   if(arg_RANKS)
     target_link_libraries(test_${name} PRIVATE vdi_test_mpi_main MPI::MPI_CXX ${arg_LINK})
@@ -101,6 +111,7 @@ endfunction()
 # and adds the environment of all tests.
 function(vdi_test_properties test)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "LABELS;ENVIRONMENT")
+  vdi_time_limit(arg_TIMEOUT "${arg_TIMEOUT}")
   set_tests_properties(
     ${test} PROPERTIES TIMEOUT "${arg_TIMEOUT}" LABELS "${arg_LABELS}" ENVIRONMENT
                        "${VDI_TEST_ENVIRONMENT};${arg_ENVIRONMENT}")
