@@ -2,12 +2,12 @@
  * by side along x. Arguments: a JSON text, a script that ends in .py, or "-" for no library at all;
  * the number of steps. The first rank prints "initialize CODE MICROSECONDS", a line "step NUMBER
  * CODE MICROSECONDS BUSY" for each step, and "finalize CODE MICROSECONDS"; the time is that of the
- * slowest rank. BUSY is 1 if the file VDI_TEST_BUSY doesn't exist before the step, because its
- * frame is still under way. Exit status 0 if all ranks have the same codes. VDI_TEST_SIZE: N, 16
- * unless given. VDI_TEST_PAUSE: milliseconds after each step. VDI_TEST_REPEAT: the number of times
- * that the heat spreads in a step. VDI_TEST_KILL=STEP: kills the last rank's worker while that step
- * is handed over. VDI_TEST_FILE_LIMIT: the largest file, in bytes, that the last rank may make
- * during the first three steps. VDI_TEST_UNEQUAL: the first rank
+ * slowest rank. BUSY is 1 if a frame is made meanwhile: of the last step before this one that
+ * VDI_TEST_EVERY divides, vdi_NUMBER.vdi doesn't exist yet. Exit status 0 if all ranks have the same
+ * codes. VDI_TEST_SIZE: N, 16 unless given. VDI_TEST_PAUSE: milliseconds after each step.
+ * VDI_TEST_REPEAT: the number of times that the heat spreads in a step. VDI_TEST_KILL=STEP: kills
+ * the last rank's worker while that step is handed over. VDI_TEST_FILE_LIMIT: the largest file, in
+ * bytes, that the last rank may make during the first three steps. VDI_TEST_UNEQUAL: the first rank
  * has a second array, "W", which the others lack. VDI_TEST_HURRY: how many times as fast the steady
  * clock runs in this process while it finalizes. */
 #define _GNU_SOURCE
@@ -138,6 +138,12 @@ static void limit_files(int step) {
   setrlimit(RLIMIT_FSIZE, &limit);
 }
 
+static int is_frame_missing(int step) {
+  char file[40];
+  snprintf(file, sizeof file, "vdi_%06d.vdi", step);
+  return access(file, F_OK) != 0;
+}
+
 int main(int argc, char** argv) {
   int rank = 0;
   int ranks = 0;
@@ -148,7 +154,7 @@ int main(int argc, char** argv) {
   const int repeat = number_of("VDI_TEST_REPEAT", 1);
   const int kill_step = number_of("VDI_TEST_KILL", -1);
   const int pause = number_of("VDI_TEST_PAUSE", 0);
-  const char* busy = getenv("VDI_TEST_BUSY");
+  const int every = number_of("VDI_TEST_EVERY", 0);
   heat_middle();
 
   vdi_catalyst* catalyst = NULL;
@@ -166,7 +172,7 @@ int main(int argc, char** argv) {
   }
   for (int step = 0; step < steps; ++step) {
     if (rank == ranks - 1) limit_files(step);
-    const int is_busy = busy != NULL && access(busy, F_OK) != 0;
+    const int is_busy = every > 0 && step > 0 && is_frame_missing((step - 1) / every * every);
     pid_t worker = 0;
     pthread_t killer;
     MPI_Barrier(MPI_COMM_WORLD);

@@ -2,10 +2,12 @@
 step without the library: between frames, while a frame is made, and when values are handed over. Argument: the simulation,
 which runs on one rank.
 
-With two cores or more, the simulation has the first one and the process the others. Prints the ratios of medians. It fails
-if a step waits for a frame.
+With two cores or more, the simulation has the first one and the process the others. A step's time differs from one process
+to the next, because each has other pages of memory. The ratio of steps of the same process is far steadier. Prints the
+ratios of medians, as the median of all rounds with the least and the most. It fails if a step waits for a frame.
 """
 
+import math
 import os
 import re
 import statistics
@@ -16,45 +18,60 @@ import tempfile
 program = sys.argv[1]
 CORES = sorted(os.sched_getaffinity(0))
 OWN = len(CORES) > 1
-STEPS = 1000
-FRAME = 500  # the step whose frame is watched; that of step 0 has long been made
-FILE = "vdi_%06d.vdi" % FRAME
-TEXT = ('{"field": "T", "every": %d, "resolution": [640, 480], "colors": {"range": [0, 1]}, "existing": "overwrite", '
-        '"isolation": "process"}') % FRAME
+ROUNDS = 3
+FRAMES = 8  # in each round; the first of them makes buffers and compiles shaders, and doesn't count
+LAUNCHER = "taskset -c " + ",".join(str(core) for core in CORES[1:])  # of one process
 
 
-def run(what, steps, **environment):
-    """The (microseconds, whether the watched frame doesn't exist yet) of each step."""
+def run(what, steps, every, **environment):
+    """The (microseconds, whether a frame is made meanwhile) of each step."""
     command = [program, what, str(steps)]
     if OWN:
         command = ["taskset", "-c", str(CORES[0]), *command]
-    process = subprocess.run(command, capture_output=True, text=True, timeout=500, check=True,
-                             env={**os.environ, "VDI_TEST_SIZE": "64", "VDI_TEST_REPEAT": "20", "VDI_TEST_BUSY": FILE,
-                                  **environment})
+    with tempfile.TemporaryDirectory() as folder:
+        process = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True, cwd=folder,
+                                 env={**os.environ, "VDI_TEST_SIZE": "64", "VDI_TEST_REPEAT": "20",
+                                      "VDI_TEST_EVERY": str(every), **environment})
     assert not re.search("^(step [0-9]+|finalize|initialize) [1-9]", process.stdout, re.M), process.stdout
     return [(int(time), busy == "1") for time, busy in re.findall(r"^step \d+ 0 (\d+) (\d)$", process.stdout, re.M)]
 
 
-with tempfile.TemporaryDirectory() as folder:
-    os.chdir(folder)
-    own = {}
-    if OWN:  # a launcher of one process
-        own["VDI_ISOLATION_LAUNCHER"] = "taskset -c " + ",".join(str(core) for core in CORES[1:])
-    without = [time for time, _ in run("-", FRAME)]
-    isolated = run(TEXT, STEPS, **own)
-    os.remove(FILE)
-    without += [time for time, _ in run("-", FRAME)]
-    here = run(TEXT, FRAME + 1, VDI_ISOLATION="none")
-    os.chdir("/")
+def text(every):
+    return ('{"field": "T", "every": %d, "resolution": [640, 480], "colors": {"range": [0, 1]}, "isolation": "process"}'
+            % every)
 
-base = statistics.median(without)
-making = [time for time, busy in isolated[FRAME + 1:] if busy]
-between = [time for time, busy in isolated[FRAME + 1:] if not busy]
-handing = isolated[FRAME][0]
-print("64^3 doubles, %s: a step takes %.2f ms without the library, %.2f ms where it hands over, %.2f ms where a frame is made "
-      "in the simulation's process" % ("own cores" if OWN else "shared cores", base / 1e3, handing / 1e3, here[FRAME][0] / 1e3))
-for name, times in (("between frames", between), ("while a frame is made", making)):
-    if times:
-        print("%s: %.3f of the step without the library (%d steps)" % (name, statistics.median(times) / base, len(times)))
-assert between, "no frame was done before the end"
-assert handing < base + (here[FRAME][0] - base) / 2, "handing over waits for the frame"
+
+def median_without(steps):
+    return statistics.median(time for time, _ in run("-", steps, 0))
+
+
+def report(name, ratios):
+    print("%s: %.3f (%.3f to %.3f)" % (name, statistics.median(ratios), min(ratios), max(ratios)))
+
+
+here = [time for time, _ in run(text(2), 9, 0, VDI_ISOLATION="none")]
+step = statistics.median(here[1::2])
+frame = statistics.median(here[2::2])
+EVERY = max(20, math.ceil(4 * frame / step))  # no frame is asked for before the last one is done
+own = {"VDI_ISOLATION_LAUNCHER": LAUNCHER} if OWN else {}
+print("64^3 doubles, %s: a step takes %.2f ms, %.2f ms where a frame is made in the simulation's process" %
+      ("own cores" if OWN else "shared cores", step / 1e3, frame / 1e3))
+
+handing, between, making, same = [], [], [], []
+for _ in range(ROUNDS):
+    bases = [median_without(EVERY * FRAMES // 4)]
+    isolated = run(text(EVERY), EVERY * FRAMES, EVERY, **own)
+    bases.append(median_without(EVERY * FRAMES // 4))
+    base = statistics.median(bases)
+    counted = list(enumerate(isolated))[EVERY:]
+    idle = statistics.median(time for number, (time, busy) in counted if number % EVERY and not busy)
+    busy = statistics.median(time for number, (time, busy) in counted if number % EVERY and busy)
+    handing.append(statistics.median(time for number, (time, _) in counted if number % EVERY == 0) / base)
+    between.append(idle / base)
+    making.append(busy / base)
+    same.append(busy / idle)
+report("between frames, of the step without the library", between)
+report("while a frame is made, of the step without the library", making)
+report("while a frame is made, of the step between frames", same)
+report("handing over, of the step without the library", handing)
+assert statistics.median(handing) < (step + frame) / 2 / step, "handing over waits for the frame"
