@@ -21,7 +21,8 @@ extern "C" {
  * whose files stay. `set_clock`, which may be null, sets the time, in seconds since the run's start, that
  * counts for the next step. `log_left_out`, which may be null, notes in the log, on the first rank, that the
  * simulation didn't hand over a step, because two earlier frames were still to be made. Neither is
- * collective. */
+ * collective. `wanted_steps`, which only the engine for scripts has, sets wanted[i] to what `wants` returns
+ * for the step first + i at any time, for i from 0 to count - 1, in one reduction. */
 typedef struct vdi_catalyst_functions {
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**);
   int (*initialize_pipelines)(int32_t, int32_t, const vdi_catalyst_pipeline*, vdi_catalyst**);
@@ -35,6 +36,7 @@ typedef struct vdi_catalyst_functions {
   int (*set_array_offset)(vdi_catalyst*, const char*, int32_t, const double*);
   int (*set_particles)(vdi_catalyst*, const char*, const vdi_catalyst_particles*);
   int (*wants)(vdi_catalyst*, int64_t, double);
+  void (*wanted_steps)(vdi_catalyst*, int64_t first, int32_t count, uint8_t* wanted);
   int (*execute)(vdi_catalyst*, int64_t, double);
   double (*parameter_f64)(vdi_catalyst*, const char*, double, double, double);
   int64_t (*parameter_i64)(vdi_catalyst*, const char*, int64_t, int64_t, int64_t);
@@ -45,8 +47,8 @@ typedef struct vdi_catalyst_functions {
 } vdi_catalyst_functions;
 
 /* An engine's only symbol. Its name contains the version, so a library of another version lacks it. */
-#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_9
-#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_9"
+#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_10
+#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_10"
 enum { VDI_CATALYST_NOT_ISOLATED = -1 };
 VDI_CATALYST_API extern const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS;
 
@@ -57,6 +59,8 @@ VDI_CATALYST_API int vdi_catalyst_make_frames_of_pipelines(int32_t fortran_commu
                                                            vdi_catalyst** catalyst);
 VDI_CATALYST_API int vdi_catalyst_make_frames_of_json(int32_t fortran_communicator, const char* json,
                                                       int goes_on, vdi_catalyst** catalyst);
+VDI_CATALYST_API void vdi_catalyst_wanted_steps(vdi_catalyst* catalyst, int64_t first, int32_t count,
+                                                uint8_t* wanted);
 VDI_CATALYST_API void vdi_catalyst_set_clock(vdi_catalyst* catalyst, double seconds);
 VDI_CATALYST_API void vdi_catalyst_log_left_out(vdi_catalyst* catalyst, int64_t step, double time);
 

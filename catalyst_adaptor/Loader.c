@@ -312,6 +312,15 @@ int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
   return code;
 }
 
+void vdi_catalyst_wanted_steps(vdi_catalyst* catalyst, int64_t first, int32_t count, uint8_t* wanted) {
+  const vdi_engine* engine = engine_of(catalyst);
+  if (engine == NULL || engine->functions->wanted_steps == NULL) return;
+  vdi_saved saved;
+  save(engine, &saved);
+  engine->functions->wanted_steps(catalyst, first, count, wanted);
+  restore(&saved);
+}
+
 void vdi_catalyst_set_clock(vdi_catalyst* catalyst, double seconds) {
   const vdi_catalyst_functions* engine = functions_of(catalyst);
   if (engine != NULL && engine->set_clock != NULL) engine->set_clock(catalyst, seconds);

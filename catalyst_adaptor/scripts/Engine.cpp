@@ -197,12 +197,19 @@ class Guard {
                   vtkSmartPyObject(PyObject_CallMethod(module_, "load_plugin", nullptr)));
   }
 
-  /// Whether a script does anything at that step, or may do so. All scripts must be loaded.
-  bool wants(int step, double time) {
+  /// As Engine::setWantedSteps. All scripts must be loaded.
+  void setWantedSteps(int first, std::span<std::uint8_t> wanted) {
     const vtkPythonScopeGilEnsurer lock;
-    const vtkSmartPyObject result(PyObject_CallMethod(module_, "wants", "id", step, time));
-    if (!result) PyErr_Clear();
-    return !result || PyObject_IsTrue(result) != 0;
+    const auto count = static_cast<Py_ssize_t>(wanted.size());
+    const vtkSmartPyObject result(PyObject_CallMethod(module_, "wanted_steps", "in", first, count));
+    char* bytes = nullptr;
+    Py_ssize_t length = 0;
+    if (result && PyBytes_AsStringAndSize(result, &bytes, &length) == 0 && length == count) {
+      std::copy_n(bytes, length, wanted.begin());
+    } else {
+      PyErr_Clear();
+      std::ranges::fill(wanted, std::uint8_t{1});
+    }
   }
 
   /// Call it after all scripts of a step.
@@ -478,11 +485,17 @@ void Engine::add() {
 
 Engine::~Engine() = default;
 
-bool Engine::wants(int step, double time) const {
+void Engine::setWantedSteps(int first, std::span<std::uint8_t> wanted) const {
   const auto& pipelines = state_->pipelines;
-  const bool allLoaded =
+  const bool areLoaded =
       std::ranges::all_of(pipelines, [](const auto& pipeline) { return pipeline->loaded(); });
-  return !allLoaded || (!pipelines.empty() && state_->guard->wants(step, time));
+  if (!areLoaded) {
+    std::ranges::fill(wanted, std::uint8_t{1});
+  } else if (pipelines.empty()) {
+    std::ranges::fill(wanted, std::uint8_t{0});
+  } else {
+    state_->guard->setWantedSteps(first, wanted);
+  }
 }
 
 Parameters& Engine::parameters() {

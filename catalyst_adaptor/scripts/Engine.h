@@ -3,8 +3,10 @@
 
 #include <mpi.h>
 
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -49,8 +51,9 @@ class Engine {
   /// Adds the prepared scripts, which run at each step in this order.
   void add();
 
-  /// Whether a script does anything at this step, or may do so. Not collective.
-  bool wants(int step, double time) const;
+  /// Sets wanted[i] to 1 if a script does anything at step first + i, or may do so, and to 0 if not. The
+  /// triggers by which scripts can refuse a step don't depend on the time. Not collective.
+  void setWantedSteps(int first, std::span<std::uint8_t> wanted) const;
 
   /// The parameters that the simulation has declared. The scripts' extractors change their values, within
   /// `execute` alone.

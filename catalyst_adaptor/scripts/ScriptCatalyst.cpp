@@ -2,10 +2,12 @@
 // blocks and arrays as a VtkGrid.
 #include <mpi.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <ctime>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -139,12 +141,27 @@ int logStep(vdi_catalyst& self, const ScriptLog::Step& step, double waitedMillis
   return code;
 }
 
+/// As Engine::setWantedSteps, for all ranks' scripts, and 0 for numbers that aren't steps.
+void setWantedSteps(const vdi_catalyst& self, std::int64_t first, std::span<std::uint8_t> wanted) {
+  std::ranges::fill(wanted, std::uint8_t{0});
+  if (isStep(first)) {
+    const auto steps = static_cast<std::uint64_t>(std::numeric_limits<int>::max() - first) + 1;
+    self.engine->setWantedSteps(static_cast<int>(first),
+                                wanted.first(std::min<std::uint64_t>(wanted.size(), steps)));
+  }
+  MPI_Allreduce(MPI_IN_PLACE, wanted.data(), static_cast<int>(wanted.size()), MPI_UINT8_T, MPI_MAX,
+                self.comm);
+}
+
+bool isWanted(const vdi_catalyst& self, std::int64_t step) {
+  std::uint8_t wanted = 0;
+  setWantedSteps(self, step, {&wanted, 1});
+  return wanted != 0;
+}
+
 /// Makes the arrays of all particles if a script will do anything at the step.
-int depositIfWanted(vdi_catalyst& self, std::int64_t step, double time) {
-  if (self.fields.particles().empty()) return VDI_CATALYST_OK;
-  int wanted = self.engine->wants(static_cast<int>(step), time) ? 1 : 0;
-  MPI_Allreduce(MPI_IN_PLACE, &wanted, 1, MPI_INT, MPI_MAX, self.comm);
-  if (wanted == 0) return VDI_CATALYST_OK;
+int depositIfWanted(vdi_catalyst& self, std::int64_t step) {
+  if (self.fields.particles().empty() || !isWanted(self, step)) return VDI_CATALYST_OK;
   return guardedTogether(
       self, VDI_CATALYST_SCRIPT,
       [&] {
@@ -217,17 +234,21 @@ int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* b
   return code;
 }
 
-int wants(vdi_catalyst* catalyst, int64_t step, double time) {
+int wants(vdi_catalyst* catalyst, int64_t step, double /*time*/) {
   if (!usable(catalyst)) return 0;
   const PythonLock lock;
-  int wanted = isStep(step) && catalyst->engine->wants(static_cast<int>(step), time) ? 1 : 0;
-  MPI_Allreduce(MPI_IN_PLACE, &wanted, 1, MPI_INT, MPI_MAX, catalyst->comm);
-  return wanted;
+  return isWanted(*catalyst, step) ? 1 : 0;
+}
+
+void setWantedSteps(vdi_catalyst* catalyst, int64_t first, int32_t count, std::uint8_t* wanted) {
+  if (!usable(catalyst)) return;
+  const PythonLock lock;
+  setWantedSteps(*catalyst, first, {wanted, static_cast<std::size_t>(count)});
 }
 
 /// Runs the scripts on the step's values.
 int runScripts(vdi_catalyst& self, int64_t step, double time) {
-  int code = depositIfWanted(self, step, time);
+  int code = depositIfWanted(self, step);
   if (code != VDI_CATALYST_OK) return code;
   code = guarded(
       self, VDI_CATALYST_ENGINE, [&] { self.grid->update(self.fields); }, step);
@@ -294,6 +315,7 @@ constinit const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = [] {
   table.make_frames_of_pipelines = makeFramesOfPipelines;
   table.set_blocks = setBlocks;
   table.wants = wants;
+  table.wanted_steps = setWantedSteps;
   table.execute = execute;
   table.finalize = finalize;
   table.log_left_out = logLeftOut;

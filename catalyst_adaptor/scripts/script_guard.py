@@ -352,18 +352,30 @@ def set_time_step():
             source.TimeStep = helper.GetTimeStep()
 
 
-def wants(step, time):
-    """Whether the scripts do anything at this step, or may do so. All scripts must be loaded."""
-    return any(hasattr(module, "catalyst_execute") for module in modules) or bool(due_extractors(step, time))
+def wanted_steps(first, count):
+    """For each of so many steps, a byte: whether the scripts do anything at that step, or may do so. All scripts must
+    be loaded."""
+    from paraview import servermanager
+    extractors = enabled_extractors()
+    always = any(hasattr(module, "catalyst_execute") for module in modules)
+    if always or not all(counts_steps(extractor.Trigger) for extractor in extractors):
+        return bytes([1]) * count
+    controller = servermanager.vtkSMExtractsController()
+
+    def is_wanted(step):
+        controller.SetTimeStep(step)
+        return any(controller.IsTriggerActivated(extractor.SMProxy) for extractor in extractors)
+
+    return bytes(map(is_wanted, range(first, first + count)))
 
 
-def due_extractors(step=None, time=None):
-    """Returns the extractors that the engine will call in this step, or in the given one."""
+def due_extractors():
+    """Returns the extractors that the engine will call in this step."""
     from paraview import servermanager
     from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
     controller = servermanager.vtkSMExtractsController()
-    controller.SetTimeStep(helper.GetTimeStep() if step is None else step)
-    controller.SetTime(helper.GetTime() if time is None else time)
+    controller.SetTimeStep(helper.GetTimeStep())
+    controller.SetTime(helper.GetTime())
 
     def due(extractor):
         trigger = extractor.Trigger

@@ -32,7 +32,7 @@ namespace vdi::catalyst {
 namespace {
 
 /// Number of future steps for which scripts are asked in advance whether they want them.
-constexpr std::int64_t stepsAhead = 1024;
+constexpr std::int32_t stepsAhead = 1024;
 constexpr std::size_t longestText = 16384;
 
 /// The processes of all ranks, in the order of the simulation's ranks. The launcher may number them in
@@ -330,9 +330,9 @@ class Worker {
     message.put(Say::Wanted);
     message.put(first);
     message.put(std::uint64_t{stepsAhead});
-    // The triggers by which scripts can refuse a step don't depend on the time.
-    for (std::int64_t i = 0; i < stepsAhead; ++i)
-      message.put(std::uint8_t(vdi_catalyst_wants(catalyst_, first + i, 0.0) != 0 ? 1 : 0));
+    std::array<std::uint8_t, stepsAhead> wanted{};
+    vdi_catalyst_wanted_steps(catalyst_, first, stepsAhead, wanted.data());
+    for (const std::uint8_t each : wanted) message.put(each);
     (void)socket_.send(message.bytes());
   }
 
