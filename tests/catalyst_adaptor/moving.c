@@ -1,8 +1,9 @@
 /* Blocks that come, go, move, and change size, spacing and rank at each step. Checks that the memory of the
- * process that makes the frames doesn't grow, be it this one or a separate one. Argument: the number of
- * frames. In the folder VDI_OUTPUT each frame's file replaces an older one. The blocks of a step are those of
- * 20 steps before. A fifth of the frames, in which memory may grow, therefore includes the largest frame.
- * VDI_ENDURANCE_FRAMES in the environment replaces the number.
+ * process that makes the frames doesn't grow, be it this one or a separate one. Arguments: the number of
+ * frames and, instead of a JSON text of its own, a script. In the folder VDI_OUTPUT each frame's file
+ * replaces an older one. The blocks of a step are those of 20 steps before. A fifth of the frames, in which
+ * memory may grow, therefore includes the largest frame. VDI_ENDURANCE_FRAMES in the environment replaces the
+ * number.
  */
 #include <math.h>
 #include <mpi.h>
@@ -82,11 +83,11 @@ int main(int argc, char** argv) {
   const char* asked = getenv("VDI_ENDURANCE_FRAMES");
   const int frames = atoi(asked != NULL ? asked : argv[1]);
   vdi_catalyst* catalyst = NULL;
-  int wrong = vdi_catalyst_initialize_json(
-                  MPI_Comm_c2f(MPI_COMM_WORLD),
-                  "{\"field\": \"V\", \"resolution\": [64, 48], \"colors\": {\"range\": [0, 1]},"
-                  " \"output\": \"moving_{timestep}.vdi\", \"existing\": \"overwrite\"}",
-                  &catalyst) != VDI_CATALYST_OK;
+  const char* what = argc > 2
+                         ? argv[2]
+                         : "{\"field\": \"V\", \"resolution\": [64, 48], \"colors\": {\"range\": [0, 1]},"
+                           " \"output\": \"moving_{timestep}.vdi\", \"existing\": \"overwrite\"}";
+  int wrong = initialize_any(what, &catalyst) != VDI_CATALYST_OK;
   static vdi_catalyst_block blocks[SIDE * SIDE * SIDE];
   static const void* data[SIDE * SIDE * SIDE];
   long early = 0;
