@@ -353,8 +353,8 @@ def set_time_step():
 
 
 def wanted_steps(first, count):
-    """For each of so many steps, a byte: whether the scripts do anything at that step, or may do so. All scripts must
-    be loaded."""
+    """For each of so many steps, a byte: whether the scripts do anything at that step, or may do
+    so. All scripts must be loaded."""
     from paraview import servermanager
     extractors = enabled_extractors()
     always = any(hasattr(module, "catalyst_execute") for module in modules)

@@ -1,10 +1,11 @@
-"""Compares the cost of a step in a simulation whose frames are made in a separate process with that of the same
-step without the library: between frames, while a frame is made, and when values are handed over. Argument: the simulation,
-which runs on one rank.
+"""Compares the cost of a step in a simulation whose frames are made in a separate process with that
+of the same step without the library: between frames, while a frame is made, and when values are
+handed over. Argument: the simulation, which runs on one rank.
 
-With two cores or more, the simulation has the first one and the process the others. A step's time differs from one process
-to the next, because each has other pages of memory. The ratio of steps of the same process is far steadier. Prints the
-ratios of medians, as the median of all rounds with the least and the most. It fails if a step waits for a frame.
+With two cores or more, the simulation has the first one and the process the others. A step's time
+differs from one process to the next, because each has other pages of memory. The ratio of steps of
+the same process is far steadier. Prints the ratios of medians, as the median of all rounds with the
+least and the most. It fails if a step waits for a frame.
 """
 
 import math

@@ -8,8 +8,7 @@ from paraview.simple import *  # noqa: F403
 image = VolumetricDepthImage(Input=TrivialProducer(registrationName="grid"))
 image.SelectInputScalars = ["CELLS", "V"]
 image.Resolution = [64, 48]
-colors = GetColorTransferFunction("V")
-colors.RescaleTransferFunction(0.0, 1.0)
+GetColorTransferFunction("V").RescaleTransferFunction(0.0, 1.0)
 GetOpacityTransferFunction("V").RescaleTransferFunction(0.0, 1.0)
 extractor = CreateExtractor("VDI", image, registrationName="vdi")
 extractor.Writer.FileName = "moving_{timestep}.vdi"
