@@ -138,16 +138,39 @@ void measure(CellPiece piece, uint pieceIndex, uint cell) {
   if (infinite != 0u) atomicMin(push.pieceRanges.at[words + pieceRangeInfinite], 0u);
 }
 
+uint pieceOfTable(float position) {
+  uint low = 0u;
+  uint high = push.tableSize;
+  while (high - low > 1u) {
+    uint middle = (low + high) / 2u;
+    if (push.pieceStarts.at[middle] <= position) {
+      low = middle;
+    } else {
+      high = middle;
+    }
+  }
+  return low;
+}
+
 void classify(CellPiece piece, uint cell) {
   vec2 range = push.ranges.at[cell];
   bool visible = false;
   if (range.x <= range.y) {
-    // The table is linear between entries, so the entries on both sides count.
-    float last = float(push.tableSize - 1u);
-    vec2 places =
-        clamp((range - piece.tableOrigin) * piece.tableScale + vec2(-0.01, 0.01), vec2(0.0), vec2(last));
-    uint begin = uint(places.x);
-    uint end = min(uint(ceil(places.y)) + 1u, push.tableSize);
+    vec2 positions = (range - piece.tableOrigin) * piece.tableScale;
+    uint begin;
+    uint end;
+    if (push.hasPieces != 0u) {
+      // Interpolated values may exceed the range by rounding.
+      vec2 spare = 4.0e-7 * (abs(range) + abs(piece.tableOrigin)) * piece.tableScale;
+      begin = pieceOfTable(positions.x - spare.x);
+      end = pieceOfTable(positions.y + spare.y) + 1u;
+    } else {
+      // The table is linear between entries, so the entries on both sides count.
+      float last = float(push.tableSize - 1u);
+      vec2 places = clamp(positions + vec2(-0.01, 0.01), vec2(0.0), vec2(last));
+      begin = uint(places.x);
+      end = min(uint(ceil(places.y)) + 1u, push.tableSize);
+    }
     visible = push.visibleBefore.at[end] > push.visibleBefore.at[begin];
   }
   push.visible.at[cell] = visible ? 1u : 0u;

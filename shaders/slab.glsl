@@ -1,5 +1,5 @@
-// The material of a slab, the part of a ray that a sample represents, by one fetch from the table of slabs.
-// Twin of vdi/core/SlabTable.cpp, whose header describes the layout.
+// The material of a slab, the part of a ray that a sample represents, by one fetch from the table of slabs; or
+// from pieces. Twin of vdi/core/SlabTable.cpp, whose header describes the layout.
 //
 // A part of raycast.glsl. The program provides params and slabs.
 #ifndef VDI_SLAB_GLSL
@@ -30,13 +30,17 @@ Sample sampleOf(vec4 colorAndDepth, float length) {
 // outside the transfer table's range.
 layout(constant_id = 7) const bool mayBeInfinite = true;
 layout(constant_id = 8) const bool reachesBeyond = true;
+// Whether the transfer function is in pieces.
+layout(constant_id = 11) const bool hasPieces = false;
 
-// The code from here on selects with mix and has no branches, so that several fetches overlap.
+#include "pieces.glsl"
+
+// The code from here on selects with mix and has no branches, so that several fetches overlap. Pieces have.
 
 bool isFinite(float value) { return !mayBeInfinite || abs(value) <= 3.0e38; }
 
-// Premultiplied colour and opacity of the part of a slab between two positions within the transfer table. A
-// NaN at one end counts as the value at the other.
+// Premultiplied colour and opacity of the part of a slab between two positions within the transfer table; with
+// pieces, straight colour and optical depth of the whole. A NaN at one end counts as the value at the other.
 vec4 slabTexel(float front, float back) {
   float first = front;
   float last = back;
@@ -44,6 +48,7 @@ vec4 slabTexel(float front, float back) {
     first = mix(mix(0.0, back, isFinite(back)), front, isFinite(front));
     last = mix(first, back, isFinite(back));
   }
+  if (hasPieces) return slabOfPieces(first, last);
   first = clamp(first, 0.0, params.lastPosition);
   last = clamp(last, 0.0, params.lastPosition);
   float span = abs(last - first);
@@ -64,7 +69,8 @@ vec4 slabOf(vec4 texel, float front, float back) {
   float depth =
       mix(-log2(1.0 - texel.a), texel.a * (1.0 + 0.5 * texel.a) * perLn2, isThin);  // opticalDepthOf
   vec4 slab = vec4(texel.rgb / max(texel.a, 1.0e-30), min(depth, maxOpticalDepth));
-  if (reachesBeyond) {
+  if (hasPieces) slab = texel;
+  if (reachesBeyond && !hasPieces) {
     // A part of the slab may lie beyond the table's ends.
     float low = min(front, back);
     float high = max(front, back);

@@ -104,6 +104,11 @@ inline std::vector<NamedFunction> namedFunctions(const Stretch& stretch) {
     many.push_back({x, 0.5 + 0.5 * glm::sin(glm::dvec3(9.0 * x, 9.0 * x + 2.0, 9.0 * x + 4.0))});
     manyOpacities.push_back({x, 0.25 + 0.2 * std::sin(11.0 * x)});
   }
+  Colors decades;  // a hue for each power of ten, down to 1e-9 of the range
+  for (int i = 9; i >= 0; --i) {
+    const double hue = i;
+    decades.push_back({std::pow(10.0, -hue), 0.5 + 0.5 * glm::sin(glm::dvec3(hue, hue + 2.0, hue + 4.0))});
+  }
   std::vector<NamedFunction> functions{
       {"hues, rising", {hues, rising}},
       {"hues, falling", {hues, falling}},
@@ -128,6 +133,9 @@ inline std::vector<NamedFunction> namedFunctions(const Stretch& stretch) {
       {"thin bands",
        {hues, {{0.0, 0.0}, {0.28, 0.0}, {0.3, 0.9}, {0.32, 0.0}, {0.68, 0.0}, {0.7, 0.9}, {0.72, 0.0}}},
        true},
+      {"air, and a jump of 1e-5", {hues, {{0.0, 0.0}, {0.4, 0.0}, {0.40001, 0.3}, {1.0, 0.8}}}, true},
+      {"a peak of 1 - 1e-9", {hues, {{0.0, 0.0}, {0.5, 1.0 - 1e-9}, {1.0, 0.0}}}, true},
+      {"decades", {decades, {{0.0, 0.1}, {1e-4, 0.3}, {1e-2, 0.2}, {1.0, 0.6}}}, true},
   };
   for (NamedFunction& named : functions) {
     for (ColorNode& node : named.function.colors) node.x = stretch.at(node.x);

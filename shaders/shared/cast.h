@@ -1,15 +1,21 @@
 // Parameters of cast.comp: ray casting the blocks of a rank.
 #ifndef VDI_SHARED_CAST_H
 #define VDI_SHARED_CAST_H
-#include "lists.h"
 #include "cells.h"
+#include "lists.h"
 #include "slab.h"
 #include "volume.h"
 
 #ifndef __cplusplus
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer BrickArray { Brick at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer KdNodeArray { KdNode at[]; };
-layout(buffer_reference, scalar, buffer_reference_align = 8) buffer UintPairArray { uvec2 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer BrickArray {
+  Brick at[];
+};
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer KdNodeArray {
+  KdNode at[];
+};
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer UintPairArray {
+  uvec2 at[];
+};
 #endif
 
 VDI_SHARED_BEGIN
@@ -33,13 +39,13 @@ VDI_CONST uint blendMinimum = 2;
 VDI_CONST uint blendIsosurface = 3;
 // A difference smaller than this share of two values counts as rounding error (core/Shading.h).
 VDI_CONST float leastGradient = 1.0e-6f;
-VDI_CONST uint castModeSearch = 0;          // sensitivities and counts
-VDI_CONST uint castModeWrite = 1;           // supersegments
+VDI_CONST uint castModeSearch = 0;  // sensitivities and counts
+VDI_CONST uint castModeWrite = 1;   // supersegments
 
 struct CastParams {
   VDI_ADDRESS(BrickArray) bricks;
-  VDI_ADDRESS(KdNodeArray) nodes;            // node 0 is the root
-  VDI_ADDRESS(CellArray) cells;              // macrocells: 1 if something in it is visible
+  VDI_ADDRESS(KdNodeArray) nodes;  // node 0 is the root
+  VDI_ADDRESS(CellArray) cells;    // macrocells: 1 if something in it is visible
   // [h][w]; merging: tolerances; while counting, of the counted lists
   VDI_ADDRESS(FloatArray) thresholds;
   // [h][w]; merging: room for pre-segments; while counting, their number in the counted lists
@@ -57,6 +63,8 @@ struct CastParams {
   VDI_ADDRESS(UintArray) histogram;          // [histogramLevels + 1][2]
   VDI_ADDRESS(UintArray) levels;             // [rows][countedWidth][countedLevelWords]
   VDI_ADDRESS(UintArray) quotas;             // [h][w]; with other ranks: as in InterpolateConstants
+  VDI_ADDRESS(SlabPieceArray) pieces;        // [pieceCount]; if the transfer function is in pieces
+  VDI_ADDRESS(PieceStartArray) pieceStarts;  // [pieceCount]
   VDI_ADDRESS(UintArray) guard;              // [1]: 0 if there is no room for the pre-segments to write
   // The ray of pixel (x, y) has start = startBase + u * startRight + v * startUp, and its direction likewise,
   // with u = x + 0.5 - w/2 and v = y + 0.5 - h/2. It starts at the front of the sample lattice, relative to
@@ -89,6 +97,8 @@ struct CastParams {
   float stripRows;
   float slabsPerDepth;
   float lastPosition;  // last position in the transfer table
+  uint pieceCount;     // 0: the transfer table has entries
+  float slabLength;    // in unit distances
   // 1: samples are classified by the scalars at their two ends; 0: by the one in their middle
   uint slabs;
   StoredForm form;  // the form of segments

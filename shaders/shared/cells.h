@@ -1,6 +1,7 @@
 // Parameters of cells.comp: macrocells, which show where a rank's blocks have no visible values.
 #ifndef VDI_SHARED_CELLS_H
 #define VDI_SHARED_CELLS_H
+#include "slab.h"
 #include "volume.h"
 
 VDI_SHARED_BEGIN
@@ -68,12 +69,14 @@ struct CellsConstants {
   // word for infinite texels becomes 0 if there are any. All bits are set beforehand.
   VDI_ADDRESS(CellArray) pieceRanges;
   VDI_ADDRESS(CellArray) visible;  // [cells]: 1 or 0
-  // [tableSize + 1]: number of visible entries before each entry of the table
+  // [tableSize + 1]: number of visible entries, or pieces, before each one of the table
   VDI_ADDRESS(CellArray) visibleBefore;
+  VDI_ADDRESS(PieceStartArray) pieceStarts;  // [tableSize]; 0: the table has entries
   uint pieceCount;
   uint cellCount;
   uint tableSize;
   uint mode;
+  uint hasPieces;
 };
 
 VDI_SHARED_END

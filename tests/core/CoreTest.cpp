@@ -24,6 +24,7 @@
 #include "vdi/core/Parallel.h"
 #include "vdi/core/Scene.h"
 #include "vdi/core/SettingsTable.h"
+#include "vdi/core/SlabTable.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/core/Vdi.h"
 #include "vdi/core/Viewpoint.h"
@@ -390,12 +391,10 @@ TEST_CASE("transfer functions are piecewise linear, with steps, constant outside
   CHECK(table.lookup(std::numeric_limits<double>::quiet_NaN()).extinction == 0.0F);
   CHECK(table.lookup(std::numeric_limits<double>::infinity()) == table.entries.back());
   CHECK(table.lookup(-std::numeric_limits<double>::infinity()) == table.entries.front());
-  CHECK(table.visible(0.5, 0.6));
   function.opacities = {{0.0, 0.0}, {1.0, 0.0}, {1.0001, 1.0}, {1.0002, 0.0}, {2.0, 0.0}};
   const TransferTable narrow = bake(function);
-  CHECK(narrow.visible(0.9, 1.1));
   CHECK(narrow.lookup(1.0001).extinction > 5.0F);
-  CHECK_FALSE(narrow.visible(0.1, 0.9));
+  CHECK(narrow.lookup(0.9999).extinction == 0.0F);
   function.opacities = {{1.0, 0.0}, {0.0, 1.0}};
   CHECK_THROWS_AS(bake(function), Error);
   function.opacities = {{0.0, 1.5}};
@@ -437,25 +436,108 @@ TEST_CASE("transfer functions: a step has the value behind it at its scalar, and
   }
 }
 
+namespace {
+
+/// The function's mean over [lo, hi] in premultiplied colour and opacity of a unit distance, by many samples.
+glm::dvec4 meanMaterial(const TransferFunction& function, double lo, double hi) {
+  constexpr int samples = 200000;
+  glm::dvec4 sum(0.0);
+  for (int i = 0; i < samples; ++i) {
+    const double x = lo + (hi - lo) * (i + 0.5) / samples;
+    const double extinction = -std::log2(1.0 - function.opacityAt(x));
+    sum += glm::dvec4(function.colorAt(x) * extinction, extinction);
+  }
+  const double depth = sum.a / samples;
+  return depth > 0.0 ? sum / sum.a * (1.0 - std::exp2(-depth)) : glm::dvec4(0.0);
+}
+
+void checkMean(const TransferFunction& function, double lo, double hi) {
+  INFO(lo << " to " << hi);
+  const TransferTable table = bake(function);
+  const SlabIntegral integral(table);
+  const glm::dvec4 expected = meanMaterial(function, lo, hi);
+  const glm::dvec4 off = glm::abs(integral.mean(table.positionOf(lo), table.positionOf(hi), 1.0) - expected);
+  CHECK(std::max({off.r, off.g, off.b, off.a}) < 1.0 / 255.0);
+}
+
+}  // namespace
+
 TEST_CASE("transfer functions: nothing is too narrow for the table") {
-  // A peak beside a far outlier, which nothing shows, and then one that is shown.
+  // A peak beside a far outlier; then air in front of a jump, within the range and above it.
   TransferFunction function;
   function.colors = {{0.0, {1.0, 0.0, 0.0}}, {1e6, {0.0, 0.0, 1.0}}};
-  function.opacities = {{0.0, 0.0}, {20.0, 0.0}, {22.0, 0.5}, {24.0, 0.0}, {1e6, 0.0}};
-  const TransferTable alone = bake(function);
-  CHECK(1.0 - std::exp2(-alone.lookup(22.0).extinction) == Approx(0.5).epsilon(1e-3));
-  CHECK(alone.lookup(1e5).extinction == 0.0F);
-  function.opacities.back().opacity = 0.01;
-  const TransferTable both = bake(function);
-  const double perEntry = (both.max - both.min) / static_cast<double>(both.entries.size() - 1);
-  double sum = 0.5 * both.entries[0].extinction * perEntry;  // half of it lies in the table
-  for (std::size_t i = 1; static_cast<double>(i) * perEntry < 1000.0; ++i)
-    sum += both.entries[i].extinction * perEntry;
-  double exact = 0.0;
-  constexpr int steps = 4000;
-  for (int i = 0; i < steps; ++i)
-    exact += 4.0 / steps * -std::log2(1.0 - function.opacityAt(20.0 + 4.0 * (i + 0.5) / steps));
-  CHECK(sum == Approx(exact).epsilon(0.05));
+  for (const double behind : {0.0, 0.01}) {
+    function.opacities = {{0.0, 0.0}, {20.0, 0.0}, {22.0, 0.5}, {24.0, 0.0}, {1e6, behind}};
+    checkMean(function, 0.0, 19.9);
+    checkMean(function, 21.9, 22.1);
+    checkMean(function, 20.0, 24.0);
+    checkMean(function, 23.0, 500.0);
+    checkMean(function, 2e5, 1e6);
+    checkMean(function, 9e5, 3e6);
+  }
+  for (const double scale : {65535.0, 1.0, 1e-20, 1e20}) {
+    function.colors.back().x = scale;
+    function.opacities = {{0.0, 0.0}, {0.01526 * scale, 0.0}, {0.0152754 * scale, 0.3}, {scale, 0.8}};
+    for (const auto& [lo, hi] :
+         {std::pair(0.0, 0.0152), std::pair(0.015, 0.01526), std::pair(0.015261, 0.015275),
+          std::pair(0.01, 0.5), std::pair(0.3, 1.0), std::pair(0.9, 1.5), std::pair(1.0, 2.0)})
+      checkMean(function, lo * scale, hi * scale);
+    function.opacities = {{0.0, 0.9}, {0.7 * scale, 0.9}, {0.70001 * scale, 0.0}, {scale, 0.0}};
+    checkMean(function, -scale, 0.6 * scale);
+    checkMean(function, 0.6999 * scale, 0.70002 * scale);
+    checkMean(function, 0.7001 * scale, 2.0 * scale);
+  }
+}
+
+TEST_CASE("transfer functions: a peak of opacity 1 has the mean of its slopes") {
+  TransferFunction function;
+  function.colors = {{0.0, {1.0, 0.0, 0.0}}, {1.0, {0.0, 1.0, 0.0}}};
+  for (const double peak : {0.99, 1.0 - 1e-9, 1.0}) {
+    for (const double at : {0.25, 0.0501}) {
+      function.opacities = {{0.0, 0.0}, {at, peak}, {2.0 * at, 0.0}, {1.0, 0.0}};
+      checkMean(function, 0.0, 1.0);
+      checkMean(function, 0.9 * at, 1.1 * at);
+      checkMean(function, 0.0, at);
+    }
+  }
+}
+
+TEST_CASE("transfer functions: labels keep their colours, however large their ids are") {
+  for (const std::vector<double>& ids : {std::vector<double>{0, 1, 2, 3},
+                                         {0, 1, 1500},
+                                         {0, 1, 2, 1800, 1950, 3071},
+                                         {0, 4095, 6000, 7000},
+                                         {0, 1, 997, 1009, 1097, 614454277},
+                                         {0, 1, 182305689, 312782546, 312782550, 614454276, 614454277},
+                                         {-614454277, -3, 0, 70000, 70001, 1e9}}) {
+    TransferFunction function;
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      const double share = static_cast<double>(i) / static_cast<double>(ids.size() - 1);
+      for (const double side : {-0.5, 0.5}) {
+        function.colors.push_back({ids[i] + side, {share, 1.0 - share, 0.3}});
+        function.opacities.push_back({ids[i] + side, i == 0 ? 0.0 : 0.2 + 0.6 * share});
+      }
+      // What lies between labels is clear.
+      if (i + 1 < ids.size() && ids[i + 1] - ids[i] > 1.5) {
+        for (const double x : {ids[i] + 0.5, ids[i + 1] - 0.5}) {
+          function.colors.push_back({x, {0.0, 0.0, 0.0}});
+          function.opacities.push_back({x, 0.0});
+        }
+      }
+    }
+    const TransferTable table = bake(function);
+    for (std::size_t i = 0; i < ids.size(); ++i) {
+      INFO(ids[i] << " of " << ids.size());
+      const bool isLost = std::ranges::find(table.lost, ids[i]) != table.lost.end();
+      CHECK(isLost == (i > 0 && static_cast<float>(ids[i]) == static_cast<float>(ids[i - 1])));
+      if (isLost) continue;
+      const double share = static_cast<double>(i) / static_cast<double>(ids.size() - 1);
+      const double opacity = i == 0 ? 0.0 : 0.2 + 0.6 * share;
+      const glm::vec4 seen = table.materialAt(table.positionOf(ids[i]));
+      CHECK(seen.a == Approx(opacity).margin(1e-3));
+      CHECK(seen.r == Approx(share * opacity).margin(1e-3));
+    }
+  }
 }
 
 TEST_CASE("who owns what: points to the last point, cells whole, ghosts never") {

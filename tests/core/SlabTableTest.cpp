@@ -18,7 +18,7 @@ TransferFunction withoutRed() {
 TEST_CASE("slab table: a channel that the transfer function lacks is zero in rising and falling slabs") {
   const TransferTable transfer = bake(withoutRed());
   const SlabTable table = makeSlabTable(transfer, 1.0F);
-  const double last = static_cast<double>(transfer.entries.size() - 1);
+  const double last = static_cast<double>(transfer.positions - 1);
   for (const double front : {0.0, 0.1, 0.34, 0.5, 0.77, 1.0}) {
     for (const double back : {0.0, 0.101, 0.25, 0.5, 0.83, 1.0}) {
       CAPTURE(front, back);

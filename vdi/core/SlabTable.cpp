@@ -12,8 +12,10 @@ namespace vdi {
 
 namespace {
 
+using gpu::shared::slabParts;
 using gpu::shared::slabSide;
 using gpu::shared::slabStripStep;
+using gpu::shared::slabThin;
 
 /// Premultiplied colour and opacity of material with that mean entry along `length`.
 glm::dvec4 accumulated(const glm::dvec4& mean, double length) {
@@ -25,43 +27,110 @@ glm::dvec4 accumulated(const glm::dvec4& mean, double length) {
 
 }  // namespace
 
-SlabIntegral::SlabIntegral(const TransferTable& table) : entries_(table.entries), sums_(entries_.size()) {
-  for (std::size_t i = 1; i < entries_.size(); ++i)
-    sums_[i] = sums_[i - 1] + 0.5 * (glm::dvec4(entries_[i - 1].vector()) + glm::dvec4(entries_[i].vector()));
+namespace {
+
+/// A distance between positions below which rounding spoils the difference of two sums over entries.
+constexpr double nearlyNothing = 1e-6;
+
+}  // namespace
+
+SlabIntegral::SlabIntegral(const TransferTable& table)
+    : pieces_(table.pieces), sums_(std::max(table.entries.size(), table.pieces.size())) {
+  // The entries give the distribution between them, and the mean its sum.
+  for (std::size_t i = 0; i + 1 < table.entries.size(); ++i) {
+    const glm::dvec4 mean = table.means[i];
+    Gap gap{table.entries[i].vector(), table.entries[i + 1].vector()};
+    const glm::dvec4 ends = 0.5 * (gap.front + gap.back);
+    for (int k = 0; k < 4; ++k) {
+      gap.front[k] = ends[k] > 0.0 ? gap.front[k] / ends[k] * mean[k] : mean[k];
+      gap.back[k] = ends[k] > 0.0 ? gap.back[k] / ends[k] * mean[k] : mean[k];
+    }
+    gaps_.push_back(gap);
+    sums_[i + 1] = sums_[i] + mean;
+  }
+  if (!table.entries.empty()) ends_ = {table.entries.front().vector(), table.entries.back().vector()};
+  // The first piece has no end in front.
+  for (std::size_t i = 2; i < pieces_.size(); ++i) {
+    const TransferPiece& piece = pieces_[i - 1];
+    const double width = static_cast<double>(pieces_[i].start) - piece.start;
+    sums_[i] = sums_[i - 1] + 0.5 * width * (glm::dvec4(piece.front) + glm::dvec4(piece.back));
+  }
 }
 
 glm::dvec4 SlabIntegral::upTo(double position) const {
-  const double inside = std::clamp(position, 0.0, static_cast<double>(entries_.size() - 1));
-  const auto below = std::min(static_cast<std::size_t>(inside), entries_.size() - 2);
+  const double inside = std::clamp(position, 0.0, static_cast<double>(gaps_.size()));
+  const auto below = std::min(static_cast<std::size_t>(inside), gaps_.size() - 1);
   const double share = inside - static_cast<double>(below);
-  const glm::dvec4 a = entries_[below].vector();
-  const glm::dvec4 b = entries_[below + 1].vector();
-  return sums_[below] + share * (a + 0.5 * share * (b - a)) + (position - inside) * glm::mix(a, b, share);
+  const Gap& gap = gaps_[below];
+  return sums_[below] + share * (gap.front + 0.5 * share * (gap.back - gap.front)) +
+         (position - inside) * (position < inside ? ends_.front : ends_.back);
+}
+
+std::size_t SlabIntegral::pieceAt(double position) const {
+  const auto above = std::ranges::upper_bound(pieces_, position, {}, &TransferPiece::start);
+  return above == pieces_.begin() ? 0 : static_cast<std::size_t>(above - pieces_.begin()) - 1;
+}
+
+double SlabIntegral::endOf(std::size_t piece) const {
+  constexpr double far = 1e30;
+  return piece + 1 < pieces_.size() ? pieces_[piece + 1].start : far;
+}
+
+glm::dvec4 SlabIntegral::inPiece(std::size_t piece, double position) const {
+  const TransferPiece& it = pieces_[piece];
+  const double share = std::clamp((position - it.start) / (endOf(piece) - it.start), 0.0, 1.0);
+  return glm::mix(glm::dvec4(it.front), glm::dvec4(it.back), share);
+}
+
+glm::dvec4 SlabIntegral::meanOfPieces(double low, double high) const {
+  const std::size_t first = pieceAt(low);
+  const std::size_t last = pieceAt(high);
+  if (first == last) return inPiece(first, 0.5 * (low + high));
+  const double begin = endOf(first);
+  const double end = pieces_[last].start;
+  const glm::dvec4 inFirst = inPiece(first, low) + glm::dvec4(pieces_[first].back);
+  const glm::dvec4 inLast = glm::dvec4(pieces_[last].front) + inPiece(last, high);
+  const glm::dvec4 sum =
+      0.5 * (begin - low) * inFirst + (sums_[last] - sums_[first + 1]) + 0.5 * (high - end) * inLast;
+  return sum / (high - low);
+}
+
+glm::dvec4 SlabIntegral::meanEntry(double front, double back) const {
+  if (!pieces_.empty()) return meanOfPieces(std::min(front, back), std::max(front, back));
+  if (std::abs(back - front) >= nearlyNothing) return (upTo(back) - upTo(front)) / (back - front);
+  const double middle = 0.5 * (front + back);
+  return (upTo(middle + 0.5 * nearlyNothing) - upTo(middle - 0.5 * nearlyNothing)) / nearlyNothing;
 }
 
 glm::dvec4 SlabIntegral::mean(double front, double back, double length) const {
-  return accumulated((upTo(back) - upTo(front)) / (back - front), length);
+  return accumulated(meanEntry(front, back), length);
 }
 
 // Divides the slab into parts of equal length, front to back. Within a part, light from all places counts the
 // same. Their number suffices to separate the transfer function's features.
 glm::dvec4 SlabIntegral::between(double front, double back, double length) const {
-  constexpr double thin = 0.1;     // optical depth below which nearer material hides nothing
   constexpr double opaque = 16.0;  // optical depth above which nothing shines through
   constexpr double maxParts = 64.0;
-  constexpr double nearlyNothing = 1e-6;  // below it, rounding spoils the difference of two sums
+  const glm::dvec4 whole = meanEntry(front, back);
   const double span = back - front;
-  if (std::abs(span) < nearlyNothing)
-    return mean(front - 0.5 * nearlyNothing, front + 0.5 * nearlyNothing, length);
-  const glm::dvec4 start = upTo(front);
-  const glm::dvec4 whole = (upTo(back) - start) / span;
-  if (whole.a * length <= thin) return accumulated(whole, length);
-  const int parts = static_cast<int>(std::clamp(std::abs(span), 1.0, maxParts));  // spans may exceed any int
+  const bool isPoint = pieces_.empty() ? std::abs(span) < nearlyNothing : span == 0.0;
+  if (whole.a * length <= slabThin || isPoint) return accumulated(whole, length);
+  const int parts = !pieces_.empty() ? static_cast<int>(slabParts)
+                                     : static_cast<int>(std::clamp(std::abs(span), 1.0, maxParts));
   glm::dvec4 sum(0.0);
-  glm::dvec4 before = start;
+  double before = front;
+  glm::dvec4 upToBefore = pieces_.empty() ? upTo(front) : glm::dvec4(0.0);
   for (int part = 1; part <= parts && sum.a < 1.0 - std::exp2(-opaque); ++part) {
-    const glm::dvec4 here = upTo(front + span * part / parts);
-    sum += (1.0 - sum.a) * accumulated((here - before) / (span / parts), length / parts);
+    const double here = front + span * part / parts;
+    glm::dvec4 mean;
+    if (pieces_.empty()) {
+      const glm::dvec4 upToHere = upTo(here);
+      mean = (upToHere - upToBefore) / (here - before);
+      upToBefore = upToHere;
+    } else {
+      mean = meanEntry(before, here);
+    }
+    sum += (1.0 - sum.a) * accumulated(mean, length / parts);
     before = here;
   }
   return sum;
@@ -100,7 +169,11 @@ float slabLength(const DepthLattice& lattice, const TransferTable& table) {
 SlabTable makeSlabTable(const TransferTable& transfer, float length) {
   SlabTable table;
   table.length = length;
-  table.positions = transfer.entries.size();
+  table.positions = transfer.positions;
+  if (!transfer.pieces.empty()) {
+    table.integral = std::make_shared<const SlabIntegral>(transfer);
+    return table;
+  }
   table.texels.resize(table.height() * slabSide);
   const SlabIntegral integral(transfer);
   const auto point = [&](double position) { return accumulated(transfer.at(position).vector(), length); };
@@ -176,6 +249,12 @@ Slab SlabTable::between(double front, double back) const {
     Slab slab = between(front, back);
     slab.opticalDepth *= 0.5F;
     return slab;
+  }
+  if (integral) {
+    const glm::dvec4 seen = integral->between(front, back, length);
+    const float depth =
+        static_cast<float>(std::min(integral->meanEntry(front, back).a * length, double{maxExtinction}));
+    return seen.a > 0.0 ? Slab{glm::vec3(glm::dvec3(seen) / seen.a), depth} : Slab{};
   }
   const double last = static_cast<double>(positions - 1);
   const double frontInside = std::clamp(front, 0.0, last);

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <memory>
 #include <vector>
 
 #include "vdi/core/Scene.h"
@@ -30,16 +31,31 @@ class SlabIntegral {
   glm::dvec4 between(double front, double back, double length) const;
   /// The mean between two different positions, without any occlusion.
   glm::dvec4 mean(double front, double back, double length) const;
+  /// The mean's associated colour and extinction; at a single position the function's own.
+  glm::dvec4 meanEntry(double front, double back) const;
 
  private:
+  /// The function between two entries, linear.
+  struct Gap {
+    glm::dvec4 front{0.0};
+    glm::dvec4 back{0.0};
+  };
   glm::dvec4 upTo(double position) const;  // the transfer table's integral from position 0 on
+  std::size_t pieceAt(double position) const;
+  double endOf(std::size_t piece) const;
+  glm::dvec4 inPiece(std::size_t piece, double position) const;
+  glm::dvec4 meanOfPieces(double low, double high) const;
 
-  std::vector<TransferTableEntry> entries_;
-  std::vector<glm::dvec4> sums_;  // up to each entry
+  std::vector<Gap> gaps_;
+  Gap ends_;  // the outermost entries
+  std::vector<TransferPiece> pieces_;
+  std::vector<glm::dvec4> sums_;  // up to each entry; or up to each piece, from the second one on
 };
 
-/// A texture of slabs of one length. One filtered fetch gives any slab. Texels are premultiplied colour and
-/// opacity, which may be averaged; in a mean of optical depths, opaque slabs would outweigh all others.
+/// Slabs of one length. If the transfer table has entries, they are a texture, and one filtered fetch gives
+/// any slab. Texels are premultiplied colour and opacity, which may be averaged; in a mean of optical depths,
+/// opaque slabs would outweigh all others. If it has pieces, there are no texels: each slab is integrated
+/// when it is needed (shaders/pieces.glsl).
 ///
 /// - Rows 0 .. slabSide - 1 are the square. Texel (x, y) runs from x to y, in slabSide - 1 steps over the
 ///   transfer table's range.
@@ -50,9 +66,10 @@ class SlabIntegral {
 /// A strip is cut into rows, of which neighbours share a texel: entry e is in row e / slabStripStep, column e
 /// % slabStripStep, and again at the end of the row before.
 struct SlabTable {
-  float length = 1.0F;               // length of its slabs, in unit distances
-  std::size_t positions = 0;         // size of the transfer table: TransferTable::entries.size()
-  std::vector<glm::u16vec4> texels;  // [height()][slabSide]: half floats (core/Half.h)
+  float length = 1.0F;                           // length of its slabs, in unit distances
+  std::size_t positions = 0;                     // TransferTable::positions
+  std::vector<glm::u16vec4> texels;              // [height()][slabSide]: half floats (core/Half.h); or empty
+  std::shared_ptr<const SlabIntegral> integral;  // of pieces; else null
   glm::vec4 below{0.0F};  // a slab wholly below the transfer table's range: straight colour and optical depth
   glm::vec4 above{0.0F};  // a slab wholly above it
 

@@ -51,15 +51,39 @@ struct TransferTableEntry {
 
 inline constexpr float maxExtinction = 65504.0F;  // the largest half float
 
-/// The function sampled at `entries.size()` evenly spaced scalars from `min` to `max`, linear in between,
-/// constant outside. A *position* in the table is a scalar in units of entries: 0 is `min`, entries.size() -
-/// 1 is `max`.
+/// A stretch of a transfer function along which associated colour and extinction are linear in the scalar. It
+/// ends where the next one starts.
+struct TransferPiece {
+  float start = 0.0F;     // position in the table, as the device has it
+  glm::vec4 front{0.0F};  // associated colour and extinction at its start
+  glm::vec4 back{0.0F};   // the same at its end
+  bool operator==(const TransferPiece&) const = default;
+};
+
+/// The function as lookups read it, in one of two forms. Both are constant outside the nodes.
+///
+/// - Entries: even samples from `min` to `max`, linear in between. Most functions have this form. A lookup of
+///   the device is one filtered fetch (core/SlabTable.h).
+/// - Pieces: stretches of any length, for functions with features that even samples can't resolve, such as
+///   steps at large label ids, ramps of 1e-5 of the range, or many decades. A lookup searches the pieces.
+///
+/// A *position* in the table is a scalar in units of entries: 0 is `min`, positions - 1 is `max`. With
+/// pieces, `min` is the scalar between the outermost nodes that is nearest to 0, because floats are most
+/// exact there, and positions may be negative.
 struct TransferTable {
   double min = 0.0;
   double max = 1.0;  // > min
   double unitDistance = 1.0;
-  std::vector<TransferTableEntry> entries;  // at least 2
+  std::size_t positions = 2;                // >= 2
+  std::vector<TransferTableEntry> entries;  // [positions], or empty
+  std::vector<glm::vec4> means;  // [positions - 1]: the function's mean from each entry to the next
+  /// In ascending order, or empty. The first one starts, and the last one ends, far beyond any scalar.
+  std::vector<TransferPiece> pieces;
+  /// Scalars of nodes whose material no value on the device shows, because 32-bit floats can't tell them
+  /// from others'.
+  std::vector<double> lost;
 
+  double last() const { return static_cast<double>(positions - 1); }
   /// Does not clamp, but stays finite for infinite scalars; NaN for NaN.
   double positionOf(double scalar) const;
   /// The entry at a position; transparent for NaN.
@@ -69,14 +93,12 @@ struct TransferTable {
   glm::vec4 materialAt(double position) const;
   TransferTableEntry lookup(double scalar) const { return at(positionOf(scalar)); }
   bool operator==(const TransferTable&) const = default;
-  /// Whether some scalar in [lo, hi] has opacity > 0. Empty-space skipping uses this.
-  bool visible(double lo, double hi) const;
 };
 
-/// Samples the function. The size is a power of two from 1024 to 16384, large enough for two entries between
-/// neighbouring nodes where possible. Where it isn't, the range leaves out the ends at which the function is
-/// constant or transparent; if that isn't enough, an entry is the mean of the function around it. From the
-/// scalar of a step on, the table has the values behind the step; up to one entry before, those in front.
+/// Makes the form with entries if it shows the function: then there are a power of two from 1024 to 16384
+/// entries, at least two between neighbouring nodes, and sixteen if there are steps. From the scalar of a
+/// step on, both forms have the values behind the step. Up to the step, pieces have the values in front of
+/// it, and entries up to one entry before.
 TransferTable bake(const TransferFunction& transferFunction);
 
 }  // namespace vdi

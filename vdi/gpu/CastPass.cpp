@@ -77,11 +77,11 @@ ComputePipeline& CastPass::pipelineFor(const Program& program) {
   const std::size_t pageCount = volume_->pages().size();
   assert(pageCount >= 1 && pageCount <= shared::castMaxPages);
   PipelineSet& pipelines = program.lanesPerRay > 1 ? lanePipelines_ : pipelines_;
-  ComputePipeline& pipeline =
-      pipelines.with({program.program, static_cast<std::uint32_t>(pageCount), program.encoding,
-                      program.samplesAhead, program.lanesPerRay, program.cutAtGaps ? 1U : 0U,
-                      program.byNeed ? 1U : 0U, volume_->mayBeInfinite() ? 1U : 0U,
-                      volume_->reachesBeyondTable() ? 1U : 0U, program.shaded ? 1U : 0U, program.blendMode});
+  ComputePipeline& pipeline = pipelines.with(
+      {program.program, static_cast<std::uint32_t>(pageCount), program.encoding, program.samplesAhead,
+       program.lanesPerRay, program.cutAtGaps ? 1U : 0U, program.byNeed ? 1U : 0U,
+       volume_->mayBeInfinite() ? 1U : 0U, volume_->reachesBeyondTable() ? 1U : 0U, program.shaded ? 1U : 0U,
+       program.blendMode, program.hasPieces ? 1U : 0U});
   const Bound now{volume_->pagesVersion(), volume_->slabsVersion()};
   Bound& bound = bound_[&pipeline];
   if (bound != now) {
@@ -119,7 +119,7 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
   // Counted samples may not be adjacent, so none are requested ahead.
   const std::uint32_t ahead = stride > 1 ? 1 : samplesAhead_;
   commands.dispatch(pipelineFor({program, encoding, lanes, ahead, band.cutAtGaps, params.level >= 0.0F,
-                                 params.shaded != 0, params.blendMode}),
+                                 params.shaded != 0, params.blendMode, params.pieceCount > 0}),
                     constants, groupsFor(width, shared::castGroupX), groupsFor(rows, shared::castGroupY));
 }
 

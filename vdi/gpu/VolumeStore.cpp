@@ -286,7 +286,7 @@ void VolumeStore::finish(Step& step) {
   // The blocks' memory belongs to the caller after this call.
   step.blocks.clear();
   for (VolumePiece& piece : step.pieces) piece.block = nullptr;
-  if (!table_.entries.empty()) placeTable(step);
+  if (hasTable()) placeTable(step);
   runCells(step, true);
   step.ranges = rangesOf(step);
   step.infinite = false;
@@ -349,7 +349,9 @@ void VolumeStore::runCells(Step& step, bool measure) {
   constants.visibleBefore = visibleBeforeBuffer_.address();
   constants.pieceCount = static_cast<std::uint32_t>(step.cellPieces.size());
   constants.cellCount = step.cellCount;
-  constants.tableSize = tableSize();
+  constants.tableSize = static_cast<std::uint32_t>(std::max(table_.entries.size(), table_.pieces.size()));
+  constants.hasPieces = table_.pieces.empty() ? 0U : 1U;
+  constants.pieceStarts = pieceStarts();
   commands_.begin();
   const auto record = [&](std::uint32_t mode) {
     constants.mode = mode;
@@ -365,7 +367,7 @@ void VolumeStore::runCells(Step& step, bool measure) {
     commands_.barrier();
     commands_.copy(step.pieceRangeBuffer, 0, pieceRanges_, 0, rangeBytes);
   }
-  if (!table_.entries.empty()) record(shared::cellsModeClassify);
+  if (hasTable()) record(shared::cellsModeClassify);
   commands_.submitAndWait();
 }
 
@@ -376,25 +378,59 @@ void VolumeStore::setTable(const TransferTable& table, float slabLength) {
   uploadSlabs();
   if (!isNew) return;
   table_ = table;
-  visibleBeforeBuffer_.reserve(device_, (table_.entries.size() + 1) * sizeof(std::uint32_t),
-                               MemoryKind::Upload);
+  uploadPieces();
+  // An entry, or a piece, is visible if it has material.
+  std::vector<bool> isVisible;
+  for (const TransferTableEntry& entry : table_.entries) isVisible.push_back(entry.extinction > 0.0F);
+  for (const TransferPiece& piece : table_.pieces)
+    isVisible.push_back(piece.front.a > 0.0F || piece.back.a > 0.0F);
+  visibleBeforeBuffer_.reserve(device_, (isVisible.size() + 1) * sizeof(std::uint32_t), MemoryKind::Upload);
   const auto visibleBefore = visibleBeforeBuffer_.mappedAs<std::uint32_t>();
   visibleBefore[0] = 0;
-  for (std::size_t i = 0; i < table_.entries.size(); ++i) {
-    visibleBefore[i + 1] = visibleBefore[i] + (table_.entries[i].extinction > 0.0F ? 1 : 0);
-  }
+  for (std::size_t i = 0; i < isVisible.size(); ++i)
+    visibleBefore[i + 1] = visibleBefore[i] + (isVisible[i] ? 1 : 0);
   Step& step = steps_[shown_];
   placeTable(step);
   runCells(step, false);
 }
 
+/// Sums of all pieces before one may be so large that their difference over a few pieces is lost in floats.
+/// So a sum comes in two floats.
+void VolumeStore::uploadPieces() {
+  const std::vector<TransferPiece>& pieces = table_.pieces;
+  const std::size_t count = std::max<std::size_t>(pieces.size(), 1);
+  pieceBuffer_.reserve(device_, count * sizeof(shared::SlabPiece), MemoryKind::Upload);
+  pieceStartBuffer_.reserve(device_, count * sizeof(float), MemoryKind::Upload);
+  const auto uploaded = pieceBuffer_.mappedAs<shared::SlabPiece>();
+  const auto starts = pieceStartBuffer_.mappedAs<float>();
+  constexpr float far = 1e30F;
+  glm::dvec4 sum(0.0);
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    const TransferPiece& piece = pieces[i];
+    const float end = i + 1 < pieces.size() ? pieces[i + 1].start : far;
+    const glm::vec4 high(sum);
+    uploaded[i] = {piece.start, end, piece.front, piece.back, high, glm::vec4(sum - glm::dvec4(high))};
+    starts[i] = piece.start;
+    const double width = static_cast<double>(end) - piece.start;
+    if (i > 0) sum += 0.5 * width * (glm::dvec4(piece.front) + glm::dvec4(piece.back));
+  }
+}
+
 void VolumeStore::uploadSlabs() {
   const auto bytes = std::as_bytes(std::span(slabTable_.texels));
-  const glm::uvec2 extent(shared::slabSide, slabTable_.height());
-  const bool isNew = !slabs_ || glm::uvec2(slabs_.extent()) != extent;
+  // Programs for pieces don't read the texture, but it must exist.
+  const glm::uvec2 extent = bytes.empty() ? glm::uvec2(1) : glm::uvec2(shared::slabSide, slabTable_.height());
+  const bool isNew = !slabs_ || (!bytes.empty() && glm::uvec2(slabs_.extent()) != extent);
   if (isNew) {
     slabs_ = SampledImage::plane(device_, extent, VK_FORMAT_R16G16B16A16_SFLOAT);
     ++slabsVersion_;
+  }
+  if (bytes.empty() && !isNew) return;
+  if (bytes.empty()) {
+    commands_.begin();
+    commands_.clear(slabs_);
+    commands_.submitAndWait();
+    return;
   }
   slabStaging_.reserve(device_, bytes.size(), MemoryKind::Upload);
   copyInParallel(bytes, slabStaging_.mapped().data());
@@ -407,7 +443,7 @@ void VolumeStore::uploadSlabs() {
 }
 
 void VolumeStore::placeTable(Step& step) {
-  const double perScalar = static_cast<double>(table_.entries.size() - 1) / (table_.max - table_.min);
+  const double perScalar = table_.last() / (table_.max - table_.min);
   for (std::size_t i = 0; i < step.bricks.size(); ++i) {
     const VolumePiece& piece = step.pieces[step.pieceOfBrick[i]];
     step.bricks[i].tableOrigin = static_cast<float>((table_.min - piece.values.offset) / piece.values.scale);

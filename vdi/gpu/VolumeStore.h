@@ -71,7 +71,10 @@ class VolumeStore {
   bool reachesBeyondTable() const;
   bool empty() const { return shown().tree.empty(); }
   std::uint32_t nodeCount() const { return static_cast<std::uint32_t>(shown().tree.size()); }
-  std::uint32_t tableSize() const { return static_cast<std::uint32_t>(table_.entries.size()); }
+  /// The transfer function's pieces, their starts, and their number, which is 0 if it has entries.
+  VkDeviceAddress tablePieces() const { return pieceBuffer_.address(); }
+  VkDeviceAddress pieceStarts() const { return pieceStartBuffer_.address(); }
+  std::uint32_t pieceCount() const { return static_cast<std::uint32_t>(table_.pieces.size()); }
   VkDeviceAddress bricks() const { return shown().brickBuffer.address(); }
   VkDeviceAddress nodes() const { return shown().nodeBuffer.address(); }
   /// The slab table that setTable made.
@@ -121,6 +124,8 @@ class VolumeStore {
   void layCells(Step& step) const;
   void finish(Step& step);
   void uploadSlabs();
+  void uploadPieces();
+  bool hasTable() const { return !table_.entries.empty() || !table_.pieces.empty(); }
   void placeTable(Step& step);
   void runCells(Step& step, bool measure);
   FiniteRanges rangesOf(const Step& step) const;
@@ -136,6 +141,8 @@ class VolumeStore {
   CellsPass cellsPass_;
   Buffer pieceRanges_;  // ranges read back from the device
   Buffer visibleBeforeBuffer_;
+  Buffer pieceBuffer_;
+  Buffer pieceStartBuffer_;
   SlabTable slabTable_;
   SampledImage slabs_;
   std::uint64_t slabsVersion_ = 0;

@@ -82,6 +82,10 @@ shared::CastParams RayCaster::prepare(const Inputs& inputs) {
   params.lastPosition = static_cast<float>(slabs.positions - 1);
   params.squarePerPosition = static_cast<float>(shared::slabStripStep) / params.lastPosition;
   params.stripRows = static_cast<float>(slabs.stripRows());
+  params.pieces = volume_.tablePieces();
+  params.pieceStarts = volume_.pieceStarts();
+  params.pieceCount = volume_.pieceCount();
+  params.slabLength = slabs.length;
   params.slabsPerDepth = static_cast<float>(1.0 / (inputs.table.unitDistance * slabs.length));
   setRegion(params, inputs.settings.region, inputs.scene);
   setLights(params, inputs.settings.shading, inputs.view);
