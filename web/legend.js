@@ -2,7 +2,9 @@
 
 /** @typedef {import("./format.js").Coloring} Coloring */
 
-const MOST_DECIMALS = 15;  // doubles have no more digits
+const MOST_DECIMALS = 15;  // more digits tell doubles apart only in the shortest text that gives the value
+const MOST_STEPS = 5;      // between round numbers
+const MOST_NUMBER = 2 ** 50;  // of a step, counted from 0; doubles hardly resolve steps with higher numbers
 
 /**
  * The value with enough digits to differ from its neighbours, even in a narrow range.
@@ -13,6 +15,7 @@ export function numberText(value, span) {
   if (Math.abs(value) < span * 1e-9) return "0";
   const size = Math.max(Math.abs(value), span);
   const decimals = 2 - Math.floor(Math.log10(span));
+  if (Math.floor(Math.log10(size)) + decimals > MOST_DECIMALS) return String(value);
   const fixed = value.toFixed(Math.min(Math.max(decimals, 0), MOST_DECIMALS));
   if (size < 1e5 && size >= 1e-3) return fixed;
   const digits = Math.floor(Math.log10(size)) + decimals;  // after the first one
@@ -22,19 +25,40 @@ export function numberText(value, span) {
 }
 
 /**
- * The numbers beside the bar: both ends, and round numbers between them that don't collide.
+ * The share of the way from `low` to `high`, whose distance may exceed the largest number.
+ * @param {number} value @param {number} low @param {number} high
+ */
+function shareOf(value, low, high) {
+  const scale = Number.isFinite(high - low) ? 1 : 0.5;
+  return (value * scale - low * scale) / (high * scale - low * scale);
+}
+
+/**
+ * The numbers beside the bar: both ends, and round numbers between them that don't collide. A range
+ * whose round numbers doubles don't resolve has its ends only.
  * @param {number} low @param {number} high
  */
-function ticksOf(low, high) {
-  const span = high - low;
+export function ticksOf(low, high) {
+  const span = Math.min(high - low, Number.MAX_VALUE);
   const power = 10 ** Math.floor(Math.log10(span / 4));
   const step = [1, 2, 5, 10].map((n) => n * power).find((s) => span / s <= 4.5) ?? span;
+  const first = Math.ceil(low / step);
   const ticks = [low, high];
-  for (let i = Math.ceil(low / step); i * step < high; ++i) {
-    const share = (i * step - low) / span;
-    if (share > 0.1 && share < 0.9) ticks.push(i * step);
+  for (let n = 0; n <= MOST_STEPS && Math.abs(first) < MOST_NUMBER; ++n) {
+    const value = (first + n) * step;
+    const share = shareOf(value, low, high);
+    if (share > 0.1 && share < 0.9) ticks.push(value);
   }
   return ticks;
+}
+
+/**
+ * Both ends of a range in six digits, or in as many as tell them apart.
+ * @param {number} low @param {number} high
+ */
+export function rangeText(low, high) {
+  const [from, to] = [low, high].map((value) => String(Number(value.toPrecision(6))));
+  return from === to ? `${low} to ${high}` : `${from} to ${to}`;
 }
 
 /** @param {Coloring} coloring */
@@ -67,7 +91,8 @@ export function showLegend(figure, coloring) {
   const low = colors.length > 0 ? colors[0][0] : 0, high = colors.length > 0 ? colors[colors.length - 1][0] : 0;
   figure.hidden = !coloring || !(high > low);
   if (!coloring || !(high > low)) return;
-  const percent = (/** @type {number} */ value) => 100 * (value - low) / (high - low);
+  const span = Math.min(high - low, Number.MAX_VALUE);
+  const percent = (/** @type {number} */ value) => 100 * shareOf(value, low, high);
   const stops = colors.map(([scalar, ...rgb]) =>
     `rgb(${rgb.map((share) => Math.round(255 * share)).join(" ")}) ${percent(scalar).toFixed(3)}%`);
   const caption = document.createElement("figcaption");
@@ -75,7 +100,7 @@ export function showLegend(figure, coloring) {
   const bar = part("bar");
   bar.style.background = `linear-gradient(to top, ${stops.join(", ")})`;
   const ticks = ticksOf(low, high).map((value) => {
-    const tick = part("tick", numberText(value, high - low));
+    const tick = part("tick", numberText(value, span));
     tick.style.bottom = `${percent(value)}%`;
     return tick;
   });
@@ -83,7 +108,6 @@ export function showLegend(figure, coloring) {
   const scale = part("scale");
   scale.style.minWidth = `calc(28px + ${widest}ch)`;
   scale.append(bar, ...ticks);
-  figure.title = coloring.range
-    ? `Values from ${coloring.range.map((value) => Number(value.toPrecision(6))).join(" to ")}` : "";
+  figure.title = coloring.range ? `Values from ${rangeText(...coloring.range)}` : "";
   figure.replaceChildren(caption, scale);
 }

@@ -2,7 +2,7 @@
 // renderer and clock.
 import {basisOf, cameraOfText, cameraText, clipMatrix, halfHeightOf, orbited, panned, toView, zoomed} from "../../web/camera.js";
 import {addControls} from "../../web/controls.js";
-import {numberText} from "../../web/legend.js";
+import {numberText, rangeText, ticksOf} from "../../web/legend.js";
 import {outlineEnds} from "../../web/renderer.js";
 import {SteerPanel, steppedValue} from "../../web/steerpanel.js";
 import {Viewer} from "../../web/viewer.js";
@@ -313,6 +313,27 @@ function testNumbers() {
     [texts(20, 0, 500, 1000), "20 520 1020"],
   ];
   for (const [got, expected] of cases) check(got === expected, `numbers: ${got}, not ${expected}`);
+  check(rangeText(-0.25, 1 / 3) === "-0.25 to 0.333333", `a range: ${rangeText(-0.25, 1 / 3)}`);
+  check(rangeText(300, 300 + 2 ** -44) === "300 to 300.00000000000006", `a narrow range: ${rangeText(300, 300 + 2 ** -44)}`);
+}
+
+/** Ranges of all widths, down to neighbouring doubles, have few ticks, in order, with texts that differ. */
+function testTicks() {
+  check(ticksOf(-2, 12.5).join() === "-2,12.5,0,5,10", `ticks: ${ticksOf(-2, 12.5)}`);
+  const least = Number.MIN_VALUE, most = Number.MAX_VALUE;
+  /** @type {[number, number][]} */
+  const ranges = [[0, least], [least, 3 * least], [-most, most], [0, most], [-1, most], [-least, least]];
+  for (const middle of [300, -300, 1e-300, 1e300, 273.15, 2 ** 53, -(2 ** 52), 2 ** 60, 0.1, 101325, 1e15]) {
+    const ulp = 2 ** (Math.floor(Math.log2(Math.abs(middle))) - 52);
+    for (const ulps of [1, 2, 3, 5, 17, 1000, 123456, 1e10]) ranges.push([middle, middle + ulps * ulp], [middle - ulps * ulp, middle]);
+  }
+  for (const [low, high] of ranges) {
+    const ticks = ticksOf(low, high);
+    const texts = ticks.map((value) => numberText(value, Math.min(high - low, most)));
+    const what = `ticks of ${low} to ${high}: ${ticks}, ${texts}`;
+    check(ticks.length <= 7 && ticks.every((value) => value >= low && value <= high), what);
+    check(new Set(texts).size === texts.length && texts.every((text) => text.length <= 26), what);
+  }
 }
 
 /** A page of fields without a browser. `enter` acts as a user who types in a field and leaves it. */
@@ -528,6 +549,7 @@ testPan();
 testZoom();
 testFarFromTheOrigin();
 testNumbers();
+testTicks();
 testNumbersOfThePanel();
 testRangeUpwards();
 testSamplingRate();

@@ -45,8 +45,9 @@ struct Panel {
   double y(double value) const { return bottom - (bottom - top) * value / most; }
   std::string axis(const char* label) const {
     std::string out;
-    const double distance = tickDistance(most, 5);
-    for (int i = 0; i * distance <= most * (1.0 + 1e-9); ++i) {
+    constexpr int count = 5;
+    const double distance = tickDistance(most, count);  // 0 if `most` is hardly above 0
+    for (int i = 0; i <= count && i * distance <= most * (1.0 + 1e-9); ++i) {
       const double at = y(i * distance);
       out += fmt::format("<path class=\"grid\" d=\"M{} {:.1f}H{}\"/>\n", left, at, right);
       out += fmt::format("<text x=\"{}\" y=\"{:.1f}\" text-anchor=\"end\">{:g}</text>\n", left - 6.0,
