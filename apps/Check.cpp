@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "apps/Commands.h"
+#include "apps/Say.h"
 #include "vdi/config/ColorMap.h"
 #include "vdi/config/Run.h"
 #include "vdi/core/ScalarRange.h"
@@ -55,14 +56,14 @@ void checkFiles(const config::Run& run) {
   const std::int64_t step = std::max<std::int64_t>(run.every, 1);
   const auto check = [&](const config::FilePattern& pattern) {
     for (const config::RunCamera& camera : run.cameras) requireWritable(pattern.path(step, camera.name));
-    fmt::print("step {}: {}\n", step, pattern.path(step, run.cameras.front().name).string());
+    fmt::print("step {}: {}\n", step, printable(pattern.path(step, run.cameras.front().name).string()));
     if (run.cameras.size() > 1) fmt::print("... and those of {} other viewpoints\n", run.cameras.size() - 1);
   };
   if (run.vdi) check(*run.vdi);
   if (run.png) check(*run.png);
   if (run.cinema) {
     check(run.cinema->pictures);
-    fmt::print("Cinema database: {}\n", run.cinema->folder.string());
+    fmt::print("Cinema database: {}\n", printable(run.cinema->folder.string()));
   }
 }
 
@@ -74,16 +75,16 @@ void check(const std::string& file) {
     map = config::colorMapOf(*colors, run.colors.file, run.colors.name);
   const ScalarRange any{0.0, 1.0};
   validate(run.transferFunction(map, any, 1.0));
-  fmt::print("{}: {}, {} x {}, {}\n", source.name, run.field, run.settings.width, run.settings.height,
-             triggersOf(run));
+  fmt::print("{}: {}, {} x {}, {}\n", printable(source.name), printable(run.field), run.settings.width,
+             run.settings.height, printable(triggersOf(run)));
   checkFiles(run);
   for (const std::string& log : {run.log.json, run.log.text}) {
     if (log.empty()) continue;
     requireWritable(log);
-    fmt::print("log: {}\n", log);
+    fmt::print("log: {}\n", printable(log));
   }
   if (run.stream) {
-    fmt::print("stream at {}:{}{}\n", run.stream->host, run.stream->port,
+    fmt::print("stream at {}:{}{}\n", printable(run.stream->host), run.stream->port,
                run.stream->steer ? ", which viewers may steer" : "");
   }
   if (!run.colors.range)
@@ -93,7 +94,7 @@ void check(const std::string& file) {
     fmt::print(
         "{} exists already: a run won't start in this folder unless \"existing\" is \"continue\" or "
         "\"overwrite\"\n",
-        there->string());
+        printable(there->string()));
   }
 }
 

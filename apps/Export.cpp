@@ -10,6 +10,7 @@
 #include "apps/Commands.h"
 #include "apps/Help.h"
 #include "apps/OutputFiles.h"
+#include "apps/Say.h"
 #include "vdi/page/Page.h"
 
 namespace vdi::apps {
@@ -38,7 +39,7 @@ void exportPage(const ExportOptions& options) {
   std::error_code error;
   const std::uintmax_t bytes = std::filesystem::file_size(options.output, error);
   if (error || inputBytes == 0) return;  // a pipe
-  fmt::print("{}: {} bytes, {:.3f} times the .vdi {}\n", options.output, bytes,
+  fmt::print("{}: {} bytes, {:.3f} times the .vdi {}\n", printable(options.output), bytes,
              static_cast<double>(bytes) / static_cast<double>(inputBytes),
              files.size() == 1 ? "file" : "files");
 }

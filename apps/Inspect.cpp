@@ -4,8 +4,10 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "apps/Commands.h"
+#include "apps/Say.h"
 #include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/ImageMetrics.h"
@@ -55,7 +57,7 @@ void comparePictures(const CompareOptions& options) {
 
 std::string shownOf(const ScalarArray& array) {
   if (array.name.empty()) return "an array without a name";
-  std::string what = fmt::format("{} of {}", array.name, array.cells ? "cells" : "points");
+  std::string what = fmt::format("{} of {}", printable(array.name), array.cells ? "cells" : "points");
   if (array.components > 1)
     what += array.component == phase ? ", its phase"
             : array.component < 0    ? ", its magnitude"
@@ -63,14 +65,31 @@ std::string shownOf(const ScalarArray& array) {
   return what;
 }
 
+std::string fromTo(double from, double to) {
+  const auto [low, high] = numbersApart(from, to);
+  return fmt::format("from {} to {}", low, high);
+}
+
+/// Two points, with the digits that tell their coordinates apart.
+std::pair<std::string, std::string> pointsApart(const glm::dvec3& a, const glm::dvec3& b) {
+  std::pair<std::string, std::string> texts;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto [one, other] = numbersApart(a[axis], b[axis]);
+    const char* const before = axis == 0 ? "" : ", ";
+    texts.first += before + one;
+    texts.second += before + other;
+  }
+  return texts;
+}
+
 void printColoring(const Coloring& coloring) {
   const auto& [array, range, function] = coloring;
   fmt::print("  array            {}", shownOf(array));
-  if (range.min <= range.max) fmt::print(", from {:g} to {:g}", range.min, range.max);
-  fmt::print("\n  colours          {} nodes from {:g} to {:g}\n", function.colors.size(),
-             function.colors.front().x, function.colors.back().x);
-  fmt::print("  opacity          {} nodes from {:g} to {:g}, unit distance {:g}\n", function.opacities.size(),
-             function.opacities.front().x, function.opacities.back().x, function.unitDistance);
+  if (range.min <= range.max) fmt::print(", {}", fromTo(range.min, range.max));
+  fmt::print("\n  colours          {} nodes {}\n", function.colors.size(),
+             fromTo(function.colors.front().x, function.colors.back().x));
+  fmt::print("  opacity          {} nodes {}, unit distance {:g}\n", function.opacities.size(),
+             fromTo(function.opacities.front().x, function.opacities.back().x), function.unitDistance);
 }
 
 struct InfoOptions {
@@ -83,8 +102,8 @@ void printInfo(const InfoOptions& options) {
   for (const std::string& file : options.files) {
     const io::VdiFileInfo info = io::readVdiInfo(file);
     const Vdi& v = info.header;
-    fmt::print("{}\n  version          {}\n  lists            {} x {}, at most {} supersegments each\n", file,
-               info.version, v.width, v.height, v.budget);
+    fmt::print("{}\n  version          {}\n  lists            {} x {}, at most {} supersegments each\n",
+               printable(file), info.version, v.width, v.height, v.budget);
     if (v.margin != glm::ivec2(0)) {
       fmt::print(
           "  picture          {} x {}, and a margin of {} lists on either side and {} above and below\n",
@@ -97,15 +116,13 @@ void printInfo(const InfoOptions& options) {
                static_cast<double>(info.storedBytes) / 1048576.0,
                static_cast<double>(info.expandedBytes) / 1048576.0);
     fmt::print("  time             {} (step {})\n", v.time, v.timeStep);
-    fmt::print("  camera           at ({:g}, {:g}, {:g}), to ({:g}, {:g}, {:g}), up ({:g}, {:g}, {:g}), {}\n",
-               v.camera.position.x, v.camera.position.y, v.camera.position.z, v.camera.focalPoint.x,
-               v.camera.focalPoint.y, v.camera.focalPoint.z, v.camera.viewUp.x, v.camera.viewUp.y,
-               v.camera.viewUp.z,
+    const auto [position, focalPoint] = pointsApart(v.camera.position, v.camera.focalPoint);
+    fmt::print("  camera           at ({}), to ({}), up ({:g}, {:g}, {:g}), {}\n", position, focalPoint,
+               v.camera.viewUp.x, v.camera.viewUp.y, v.camera.viewUp.z,
                v.camera.parallelProjection ? fmt::format("parallel, scale {:g}", v.camera.parallelScale)
                                            : fmt::format("perspective, {:g} degrees", v.camera.viewAngle));
-    fmt::print("  scene            ({:g}, {:g}, {:g}) to ({:g}, {:g}, {:g}), sample step {:g}\n",
-               v.bounds.lo.x, v.bounds.lo.y, v.bounds.lo.z, v.bounds.hi.x, v.bounds.hi.y, v.bounds.hi.z,
-               v.sampleStep);
+    const auto [low, high] = pointsApart(v.bounds.lo, v.bounds.hi);
+    fmt::print("  scene            ({}) to ({}), sample step {:g}\n", low, high, v.sampleStep);
     if (v.coloring) printColoring(*v.coloring);
   }
 }

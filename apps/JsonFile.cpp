@@ -4,10 +4,12 @@
 #include <fmt/ranges.h>  // fmt::join
 
 #include <limits>
+#include <string_view>
 #include <utility>
 
 #include "vdi/core/Error.h"
 #include "vdi/io/Files.h"
+#include "vdi/io/JsonFault.h"
 
 namespace vdi::apps {
 
@@ -41,11 +43,14 @@ json readJson(const std::filesystem::path& path) {
     }
     return true;
   };
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   try {
-    const auto* const text = reinterpret_cast<const char*>(bytes.data());
-    return json::parse(text, text + bytes.size(), noteNames);
-  } catch (const json::exception& error) {
-    fail(fmt::format("not valid JSON: {}", error.what()));
+    return json::parse(text.begin(), text.end(), noteNames);
+  } catch (const json::parse_error& error) {
+    fail(fmt::format("line {}: not valid JSON: {}", io::lineOf(text, error.byte),
+                     io::jsonFault(text, error.byte, error.id)));
+  } catch (const json::exception& error) {  // a number that overflows
+    fail("not valid JSON: " + io::jsonFault(text, text.size(), error.id));
   }
   return {};
 }

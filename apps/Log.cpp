@@ -11,6 +11,7 @@
 #include "apps/Commands.h"
 #include "apps/Help.h"
 #include "apps/OutputFiles.h"
+#include "apps/Say.h"
 #include "vdi/io/Files.h"
 #include "vdi/runlog/Plot.h"
 #include "vdi/runlog/Record.h"
@@ -33,9 +34,9 @@ void drawLog(const LogOptions& options) {
   const runlog::RunRecords records = runlog::readRecords(input);
   const std::string svg = runlog::plot(records, {input.filename().string(), options.means});
   io::writeAtomically(output, std::as_bytes(std::span(svg)));
-  if (records.skipped > 0)
-    fmt::print(stderr, "vdi: {}: {} lines aren't records\n", input.string(), records.skipped);
-  for (const runlog::RunSummary& summary : records.summaries) fmt::print("{}\n", textLine(summary));
+  if (records.skipped > 0) say(fmt::format("{}: {} lines aren't records", input.string(), records.skipped));
+  for (const runlog::RunSummary& summary : records.summaries)
+    fmt::print("{}\n", printable(textLine(summary)));
   if (records.summaries.size() < records.starts.size()) {  // killed, or still running
     runlog::RunSummary sum;
     for (const runlog::FrameRecord& frame : records.frames) sum.add(frame);
@@ -43,7 +44,7 @@ void drawLog(const LogOptions& options) {
                records.starts.size() - records.summaries.size(), records.starts.size(), sum.frames,
                sum.failed);
   }
-  fmt::print("{}\n", output.string());
+  fmt::print("{}\n", printable(output.string()));
 }
 
 }  // namespace

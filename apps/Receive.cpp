@@ -13,6 +13,7 @@
 #include "apps/Commands.h"
 #include "apps/Help.h"
 #include "apps/OutputFiles.h"
+#include "apps/Say.h"
 #include "apps/StreamOptions.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/Files.h"
@@ -54,7 +55,7 @@ class Recorder {
     try {
       vdi = received.decode();
     } catch (const Error& error) {
-      fmt::print(stderr, "vdi: frame {} is damaged: {}\n", level.frame, error.what());
+      say(fmt::format("frame {} is damaged: {}", level.frame, error.what()));
       return;
     }
     const std::string name = fmt::format("vdi_{:06}.vdi", count_);
@@ -171,7 +172,7 @@ void receive(const ReceiveOptions& options) {
     }
     if (!walk.wants(*received)) continue;
     if (!received->missing.empty()) {
-      fmt::print(stderr, "vdi: frame {}: {}\n", received->level.frame, received->missing);
+      say(fmt::format("frame {}: {}", received->level.frame, received->missing));
       walk.advance(client, standing);
       continue;
     }

@@ -12,6 +12,7 @@
 #include "apps/Commands.h"
 #include "apps/FolderWatch.h"
 #include "apps/OutputFiles.h"
+#include "apps/Say.h"
 #include "apps/Source.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Viewpoint.h"
@@ -69,11 +70,11 @@ class Painter {
       const Camera camera = turned(start, azimuth, options_.elevation);
       const auto issue = viewpointIssue(vdi.bounds, vdi.view(), View(camera, size[0], size[1]));
       if (issue && warned_.insert(*issue).second)
-        fmt::print(stderr, "vdi: warning: at {} degrees: {}\n", azimuth, describe(*issue));
+        say(fmt::format("warning: at {} degrees: {}", azimuth, describe(*issue)));
       const std::filesystem::path path = pictureOf(options_, azimuth);
       io::writePng(path, io::toPicture(renderer_.renderBytes(camera, size[0], size[1], Alpha::Premultiplied,
                                                              reconstruction_)));
-      fmt::print("{}: {:.2f} ms on the device\n", path.string(), renderer_.renderMilliseconds());
+      fmt::print("{}: {:.2f} ms on the device\n", printable(path.string()), renderer_.renderMilliseconds());
     }
   }
 
@@ -95,11 +96,11 @@ std::optional<Vdi> newestOf(const std::vector<std::filesystem::path>& files) {
   for (auto file = files.rbegin(); file != files.rend(); ++file) {
     try {
       Vdi vdi = io::readVdi(*file);
-      fmt::print("{}\n", file->string());
+      fmt::print("{}\n", printable(file->string()));
       return vdi;
     } catch (const Error& error) {
       if (error.code() != ErrorCode::Io && error.code() != ErrorCode::Format) throw;
-      fmt::print(stderr, "vdi: {}; skipped for now\n", error.what());
+      say(fmt::format("{}; skipped for now", error.what()));
     }
   }
   return std::nullopt;

@@ -17,6 +17,7 @@
 #include "apps/FrameFiles.h"
 #include "apps/Help.h"
 #include "apps/Relay.h"
+#include "apps/Say.h"
 #include "apps/StreamOptions.h"
 #include "vdi/core/Error.h"
 #include "vdi/page/Page.h"
@@ -43,10 +44,6 @@ struct ServeOptions {
   std::uint32_t viewers = 64;
   bool isFinished = false;
 };
-
-void logLine(const std::string& line) {
-  fmt::print(stderr, "vdi: {}\n", line);
-}
 
 /// The signals that end a server. The program must block them before it starts the first thread.
 class EndSignals {
@@ -83,7 +80,7 @@ class FilesStop {
 
 FrameFiles::Options filesOf(const ServeOptions& options) {
   FrameFiles::Options files;
-  files.log = logLine;
+  files.log = say;
   files.follows = !options.isFinished;
   if (options.inputs.size() == 1 && std::filesystem::is_directory(options.inputs.front())) {
     files.folder = options.inputs.front();
@@ -108,7 +105,7 @@ void serveStdio(const ServeOptions& options) {
   server.token = stream::randomToken();
   server.mostBytesPerSecond = bytesPerSecond(options.rate);
   server.show = [&files](std::uint32_t index) { files.show(index); };
-  server.log = logLine;
+  server.log = say;
   const std::string token = server.token;
   stream::Server running(std::move(server));
   const FilesStop stop(files);
@@ -127,7 +124,7 @@ stream::ServerOptions serverOf(const ServeOptions& options, const std::string& k
   server.mostViewers = options.viewers;
   server.certificate = options.certificate;
   server.key = options.key;
-  server.log = logLine;
+  server.log = say;
   return server;
 }
 

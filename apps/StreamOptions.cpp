@@ -1,4 +1,5 @@
 #include "apps/StreamOptions.h"
+#include "apps/Say.h"
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -24,15 +25,14 @@ std::string tokenOf(const std::string& file) {
   std::string token = stream::givenToken(file);
   struct stat status {};
   if (!file.empty() && ::stat(file.c_str(), &status) == 0 && (status.st_mode & others) != 0) {
-    fmt::print(stderr, "vdi: warning: other users can read the token in {}; chmod 600 keeps it secret\n",
-               file);
+    say(fmt::format("warning: other users can read the token in {}; chmod 600 keeps it secret", file));
   }
   return token;
 }
 
 stream::ClientOptions clientOf(const std::string& from, const std::string& tokenFile) {
   stream::ClientOptions options;
-  options.log = [](const std::string& line) { fmt::print(stderr, "vdi: {}\n", line); };
+  options.log = say;
   const bool isLink = from.starts_with("http://") || from.starts_with("https://");
   if (!isLink) {
     options.command = from;

@@ -14,6 +14,7 @@
 #include <iostream>
 #include <memory>
 #include <new>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -21,6 +22,7 @@
 #include "BuildCommit.h"
 #include "apps/Commands.h"
 #include "apps/Help.h"
+#include "apps/Say.h"
 #include "apps/StreamOptions.h"
 #include "bench/Bench.h"
 #include "vdi/core/Environment.h"
@@ -31,10 +33,12 @@ namespace {
 constexpr int failed = 1;
 constexpr int badUsage = 2;
 
+using vdi::apps::say;
+
 /// The end of this rank's work.
 struct Outcome {
   int status = 0;
-  std::string message;  // empty: no error, or another rank reports it
+  std::string message;  // printable lines; empty: no error, or another rank reports it
 };
 
 /// Returns a line for each environment variable that users may set.
@@ -66,7 +70,8 @@ Outcome outcomeOf(const CLI::App& app, const CLI::ParseError& error, bool speaks
   }
   const auto chosen = app.get_subcommands();
   const std::string command = chosen.empty() ? "vdi" : "vdi " + chosen.front()->get_name();
-  return {badUsage, fmt::format("{} (see '{} --help')", firstLine(error.what()), command)};
+  return {badUsage,
+          fmt::format("{} (see '{} --help')", vdi::apps::printable(firstLine(error.what())), command)};
 }
 
 /// Requires equal arguments, because ranks with different ones would wait for each other in different calls.
@@ -76,8 +81,18 @@ void requireEqualArguments(const vdi::comm::Communicator& world, int argc, char*
   world.requireEqual(std::hash<std::string>{}(all), "command line");
 }
 
-void say(const std::string& message) {
-  fmt::print(stderr, "vdi: {}\n", message);
+/// The message of an error in printable lines. Only the list of devices has several.
+std::string linesOf(const std::string& message, bool isList) {
+  if (!isList) return vdi::apps::printable(message);
+  std::stringstream list(message);
+  std::string text;
+  for (std::string line; std::getline(list, line);)
+    text += (text.empty() ? "" : "\n") + vdi::apps::printable(line);
+  return text;
+}
+
+void sayLines(const std::string& lines) {
+  fmt::print(stderr, "vdi: {}\n", lines);
 }
 
 /// Parses the command line and runs the selected subcommand.
@@ -129,11 +144,12 @@ Outcome runTool(int argc, char** argv) {
     return runCommand(argc, argv);
   } catch (const vdi::Error& error) {
     if (error.code() == vdi::ErrorCode::RemoteRank) return {failed, {}};
-    return {error.code() == vdi::ErrorCode::InvalidArgument ? badUsage : failed, error.what()};
+    return {error.code() == vdi::ErrorCode::InvalidArgument ? badUsage : failed,
+            linesOf(error.what(), error.code() == vdi::ErrorCode::DeviceUnavailable)};
   } catch (const std::bad_alloc&) {
     return {failed, "out of memory"};
   } catch (const std::exception& error) {
-    return {failed, error.what()};
+    return {failed, linesOf(error.what(), false)};
   }
 }
 
@@ -154,13 +170,13 @@ int leaveTogether(const Outcome& mine) {
   MPI_Test(&request, &done, MPI_STATUS_IGNORE);
   while (done == 0) {
     if (mine.status != 0 && std::chrono::steady_clock::now() - start > patience) {
-      say(mine.message);
+      sayLines(mine.message);
       MPI_Abort(MPI_COMM_WORLD, mine.status);
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
     MPI_Test(&request, &done, MPI_STATUS_IGNORE);
   }
-  if (minimum[0] == rank) say(mine.message);
+  if (minimum[0] == rank) sayLines(mine.message);
   return -minimum[1];
 }
 
@@ -188,7 +204,7 @@ int main(int argc, char** argv) {
   occupyStandardStreams();
   if (!startedByMpi()) {
     const Outcome outcome = runTool(argc, argv);
-    if (!outcome.message.empty()) say(outcome.message);
+    if (!outcome.message.empty()) sayLines(outcome.message);
     return outcome.status;
   }
   MPI_Init(&argc, &argv);

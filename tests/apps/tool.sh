@@ -257,6 +257,23 @@ for command in "info one.vdi" "compare one.png one.png" "bench --compare bench.j
 done
 [ -z "$(find . -name '*.tmp*')" ] || fail "temporary files were left"
 
+# What a terminal would obey is printed as escapes.
+odd=$(printf 'odd\033[31m\nname\302\233\377\342\200\256ü')
+cp one.vdi "$odd.vdi"
+works "info" "$vdi" info "$odd.vdi"
+grep -qF 'odd\x1b[31m\nname\x9b\xff\u202eü.vdi' out.txt || fail "info prints control characters: $(cat -v out.txt)"
+refused 1 'odd\\x1b\[31m\\nname' "$vdi" info "$odd"
+[ "$(wc -l <err.txt)" -eq 1 ] || fail "a name takes several lines"
+works "render" "$vdi" render "$odd.vdi" -o "$odd.png"
+! grep -q "$(printf '\033')" out.txt err.txt || fail "render prints control characters"
+rm "$odd"*
+
+# Ranges of a few ulps.
+echo '{"colors": [[300, 0, 0, 0], [300.00000000000006, 1, 1, 1]], "opacities": [[299, 0], [301, 1]]}' >narrow.json
+works "generate" "$vdi" generate --field sphere --size 8x8x8 --resolution 8x8 --transfer-function narrow.json -o narrow.vdi
+works "info" "$vdi" info narrow.vdi
+grep -q "nodes from 300 to 300.00000000000006" out.txt || fail "info prints the same number for both ends: $(cat out.txt)"
+
 # Bad input.
 truncate -s 1T large.vdi large.png large.json
 refused 1 "large.vdi" "$vdi" render large.vdi -o x.png
@@ -264,6 +281,8 @@ refused 1 "large.png" "$vdi" compare large.png one.png
 refused 1 "large.json" "$vdi" generate --raw large.json -o x.vdi
 rm large.*
 echo '{"device": 5, "rows": [1]}' >odd.json
+echo '{"a": tru}' >broken.json
+refused 1 "line 1: not valid JSON: '}' isn't expected after '.*tru' .broken.json" "$vdi" generate --raw broken.json -o x.vdi
 refused 1 "not a result .*odd.json" "$vdi" bench --compare odd.json bench.json
 sed 's/"ssim": 0[.]/"ssim": 0.0/' bench.json >worse.json
 refused 1 "regressions" "$vdi" bench --compare bench.json worse.json

@@ -67,13 +67,17 @@ TEST_CASE("a mistake has the pointer and the line of its value") {
 }
 
 TEST_CASE("what isn't JSON is refused with its line") {
-  refusedJson("", "not valid JSON");
-  refusedJson("{\"a\": 1,\n\"b\": }", "(x.json, line 2)");
-  refusedJson("{\"a\": NaN}", "not valid JSON");
-  refusedJson("{\"a\": 1e999}", "not valid JSON");
-  refusedJson("{\"a\": 1} x", "not valid JSON");
+  refusedJson("", "not valid JSON: it ends too early (x.json, line 1)");
+  refusedJson("{\"a\": [1, 2", "not valid JSON: it ends too early");
+  refusedJson("{\"a\": 1,\n\"b\": }", "not valid JSON: '}' isn't expected after '\"b\": ' (x.json, line 2)");
+  refusedJson("}", "'}' isn't expected at the start of the line");
+  refusedJson("{\"a\": NaN}", "not valid JSON: 'N' isn't expected after '{\"a\": '");
+  refusedJson("{\"a\": 1e999}", "not valid JSON: a number is too large");
+  refusedJson("{\"a\": 1} x", "not valid JSON: 'x' isn't expected after '{\"a\": 1} '");
+  refusedJson("{\"a\": \"b\nc\"}", "not valid JSON: a line ends within a string or a word");
+  refusedJson("{\"a\": \"\x1b\"}", "not valid JSON: it has the control character U+001B");
   refusedJson("{\"a\": 1,\n\n\"b\": {\"a\": 2},\n\"a\": 3}", "the field 'a' occurs twice (x.json, line 4)");
-  refusedJson(std::string("{\"a\": \"") + '\xff' + "\"}", "not valid JSON");
+  refusedJson(std::string("{\"a\": \"") + '\xff' + "\"}", "not valid JSON: it isn't UTF-8");
   try {
     parseJson("{\"a\": \"" + std::string(100000, 'x'), "x.json");
     FAIL("a text without an end");

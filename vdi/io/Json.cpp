@@ -15,6 +15,7 @@
 
 #include "vdi/core/Error.h"
 #include "vdi/io/Files.h"
+#include "vdi/io/JsonFault.h"
 
 namespace vdi::io {
 
@@ -75,7 +76,7 @@ class Characters {
 class Builder final : public nlohmann::json_sax<nlohmann::json> {
  public:
   Builder(std::string_view text, const std::string& document, const JsonLimits& limits)
-      : document_(document), limits_(limits), taken_(text.data()), counted_(text.data()) {}
+      : text_(text), document_(document), limits_(limits), taken_(text.data()), counted_(text.data()) {}
 
   const char** taken() { return &taken_; }
   JsonNode& root() { return root_; }
@@ -102,14 +103,8 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
     members.emplace_back().first = std::move(name);
     return true;
   }
-  bool parse_error(std::size_t, const std::string&, const nlohmann::json::exception& error) override {
-    // Drops "[json.exception...] parse error at line 1, column 2: ", which repeats the place.
-    std::string what = error.what();
-    const std::size_t start = what.find(": ");
-    if (start != std::string::npos) what.erase(0, start + 2);
-    constexpr std::size_t longest = 200;
-    if (what.size() > longest) what = what.substr(0, longest) + "...";
-    failAt(document_, line(), "not valid JSON: " + what);
+  bool parse_error(std::size_t taken, const std::string&, const nlohmann::json::exception& error) override {
+    failAt(document_, line(), "not valid JSON: " + jsonFault(text_, taken, error.id));
   }
 
  private:
@@ -163,6 +158,7 @@ class Builder final : public nlohmann::json_sax<nlohmann::json> {
     }
   }
 
+  std::string_view text_;
   const std::string& document_;
   const JsonLimits& limits_;
   const char* taken_;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "vdi/core/Error.h"
+#include "vdi/io/JsonFault.h"
 #include "vdi/io/JsonText.h"
 
 namespace vdi::io {
@@ -146,8 +147,10 @@ Coloring coloringIn(std::string_view text) {
     Coloring coloring = coloringOf(object);
     validate(coloring);
     return coloring;
-  } catch (const json::exception& error) {
-    refuse(error.what());
+  } catch (const json::parse_error& error) {
+    refuse("not valid JSON: " + jsonFault(text, error.byte, error.id));
+  } catch (const json::exception& error) {  // a number that overflows
+    refuse("not valid JSON: " + jsonFault(text, text.size(), error.id));
   }
 }
 
