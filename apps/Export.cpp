@@ -1,4 +1,4 @@
-// vdi export: writes VDIs into one page for any browser.
+// vdi export: writes VDIs into one page for browsers.
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
@@ -48,7 +48,7 @@ void exportPage(const ExportOptions& options) {
 
 void addExport(CLI::App& app, Job& job) {
   CLI::App* command =
-      app.add_subcommand("export", "Write a page, in one file, that shows VDIs in any browser");
+      app.add_subcommand("export", "Write a page, in one file, that shows VDIs in a browser");
   command->footer(
       "Example:\n"
       "  vdi export coil.vdi -o coil.html\n"

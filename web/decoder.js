@@ -23,7 +23,7 @@ import {unpack} from "./unpack.js";
  */
 
 /** @typedef {{id: number, encoded?: Encoded, vdi?: PreparedVdi}} Question to decode `encoded`, or to find slopes of `vdi` */
-/** @typedef {{id: number, vdi?: PreparedVdi, leaning?: Leaning, error?: string}} Answer */
+/** @typedef {{id: number, vdi?: PreparedVdi, leaning?: Leaning, error?: string, cause?: string}} Answer */
 
 /**
  * Lets the page handle events every 12 ms.
@@ -52,7 +52,7 @@ async function prepare(encoded, pause) {
     const vdi = {...rest, offsets, words};
     return {...rest, ...headsOf(vdi), segments: vdi.compact ? words : expandedSegments(vdi)};
   } catch (error) {
-    if (error instanceof RangeError) throw new Error("there is too little memory for this VDI");
+    if (error instanceof RangeError) throw new Error("there is too little memory for this VDI", {cause: error});
     throw error;
   }
 }
@@ -75,7 +75,8 @@ export function serveDecoding() {
     try {
       scope.postMessage(...await answer(data));
     } catch (error) {
-      scope.postMessage({id: data.id, error: error instanceof Error ? error.message : String(error)});
+      const {message, cause} = error instanceof Error ? error : new Error(String(error));
+      scope.postMessage({id: data.id, error: message, cause: cause === undefined ? undefined : String(cause)});
     }
   };
   scope.postMessage({id: -1});  // ready
@@ -98,12 +99,14 @@ export class Decoder {
       const worker = new Worker(url);
       return await new Promise((resolve) => {
         worker.onmessage = ({data}) => data.id < 0 ? resolve(worker) : this.take(data);
-        worker.onerror = () => {
+        worker.onerror = (event) => {
+          console.warn("the worker has failed:", event.message);
           resolve(undefined);
-          this.fail(worker);
+          this.fail(worker, event.message);
         };
       });
-    } catch {
+    } catch (error) {
+      console.warn("the browser refuses a worker:", error);
       return undefined;
     } finally {
       URL.revokeObjectURL(url);
@@ -115,14 +118,14 @@ export class Decoder {
     const asked = this.asked.get(answer.id);
     this.asked.delete(answer.id);
     if (answer.error === undefined) asked?.resolve(answer);
-    else asked?.reject(new Error(answer.error));
+    else asked?.reject(new Error(answer.error, {cause: answer.cause}));
   }
 
-  /** @param {Worker} worker a worker that has ended */
-  fail(worker) {
+  /** @param {Worker} worker a worker that has ended @param {unknown} cause */
+  fail(worker, cause) {
     worker.terminate();
     this.worker = Promise.resolve(undefined);
-    for (const {reject} of this.asked.values()) reject(new Error("the browser stopped decoding this VDI"));
+    for (const {reject} of this.asked.values()) reject(new Error("the browser stopped decoding this VDI", {cause}));
     this.asked.clear();
   }
 

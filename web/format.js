@@ -70,9 +70,9 @@ const METADATA_VERSION = 3;
 const METADATA_HEADER_BYTES = 16;
 const MAX_METADATA_BYTES = 1 << 20;
 
-/** @param {string} what @returns {never} */
-function fail(what) {
-  throw new FormatError(`invalid .vdi file: ${what}`);
+/** @param {string} what @param {unknown} [cause] @returns {never} */
+function fail(what, cause) {
+  throw new FormatError(`invalid .vdi file: ${what}`, {cause});
 }
 
 /** @param {DataView} view @param {number} at */
@@ -166,8 +166,8 @@ function decodeMetadata(bytes, view, at) {
   let json;
   try {
     json = JSON.parse(new TextDecoder("utf-8", {fatal: true}).decode(text));
-  } catch {
-    fail("its metadata aren't JSON");
+  } catch (cause) {
+    fail("its metadata aren't JSON", cause);
   }
   return coloringOf(json);
 }

@@ -8,9 +8,9 @@ export const SUBPROTOCOL = "pv-vdi.1";
 /** Reports a message that breaks the protocol. Its text is one line for the user. */
 export class StreamError extends Error {}
 
-/** @param {string} what @returns {never} */
-function refuse(what) {
-  throw new StreamError(`the server's message is damaged: ${what}`);
+/** @param {string} what @param {unknown} [cause] @returns {never} */
+function refuse(what, cause) {
+  throw new StreamError(`the server's message is damaged: ${what}`, {cause});
 }
 
 /**
@@ -200,8 +200,8 @@ export function serverMessageOf(text) {
   let json;
   try {
     json = JSON.parse(text);
-  } catch {
-    refuse("it isn't JSON");
+  } catch (cause) {
+    refuse("it isn't JSON", cause);
   }
   switch (json?.type) {
     case "welcome":

@@ -133,8 +133,12 @@ export class Renderer {
    * @param {HTMLCanvasElement} canvas
    */
   constructor(canvas) {
+    let cause = "";
+    canvas.addEventListener("webglcontextcreationerror", (event) => {
+      cause ||= /** @type {WebGLContextEvent} */ (event).statusMessage;
+    });
     const gl = canvas.getContext("webgl2", {alpha: false, antialias: true, powerPreference: "high-performance"});
-    if (!gl) throw new Error("this browser has no WebGL2, and VDIs can't be shown without it");
+    if (!gl) throw new Error(`VDIs can't be shown without WebGL2, which this browser refuses${cause && `: ${cause}`}`);
     this.gl = gl;
     this.canvas = canvas;
     /** @type {Loaded | undefined} */

@@ -7,8 +7,8 @@ function bytesOfBase64(text) {
   let binary;
   try {
     binary = atob(text);
-  } catch {
-    throw new FormatError("this page's data are damaged: they aren't base64");
+  } catch (cause) {
+    throw new FormatError("this page's data are damaged: they aren't base64", {cause});
   }
   const bytes = new Uint8Array(binary.length);
   for (let i = 0; i < bytes.length; ++i) bytes[i] = binary.charCodeAt(i);
@@ -31,14 +31,16 @@ export async function unpack(text, size) {
   const bytes = new Uint8Array(size);
   let at = 0;
   try {
-    const blob = new Blob([/** @type {BlobPart} */ (packed)]);
-    const reader = blob.stream().pipeThrough(new DecompressionStream("deflate-raw")).getReader();
+    // WebKit's workers can't read a Blob's stream.
+    const body = new Response(/** @type {BodyInit} */ (packed)).body;
+    if (!body) throw new Error("the browser gives no stream");
+    const reader = body.pipeThrough(new DecompressionStream("deflate-raw")).getReader();
     for (let part = await reader.read(); !part.done; part = await reader.read()) {
       bytes.set(part.value, at);  // throws if the part doesn't fit
       at += part.value.length;
     }
-  } catch {
-    throw new FormatError("this page's data are damaged and can't be decompressed");
+  } catch (cause) {
+    throw new FormatError(`this page's data are damaged, or this browser can't unpack them (${cause})`, {cause});
   }
   if (at !== size) throw new FormatError("this page's data are damaged: they end too early");
   return bytes;

@@ -235,8 +235,9 @@ export class Viewer {
       if (renderer.loaded?.vdi === vdi) await renderer.setLeaning(politely());
       // Begins at the first row, even if a smooth picture is drawn in part.
       if (renderer.canShear() && this.missing !== "all") [this.missing, this.nextRow] = ["detail", 0];
-    } catch {
-      this.unleanable.add(vdi);  // its smooth picture stays
+    } catch (error) {
+      console.warn("the picture stays smooth rather than sheared:", error);
+      this.unleanable.add(vdi);
     }
     this.isLeaning = false;
     this.schedule();

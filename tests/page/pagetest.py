@@ -133,13 +133,18 @@ def message_of(browser):
     return browser.value("document.getElementById('message').hidden ? '' : document.getElementById('message').textContent")
 
 
-def run(*tests):
+def in_chromium():
+    browser = Browser(CHROMIUM)
+    browser.size(WIDTH, HEIGHT)
+    return browser
+
+
+def run(*tests, browser=in_chromium):
     """Runs the tests in turn, in one browser and one temporary folder. Exits with status 1 after a failure."""
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
-        browser = Browser(CHROMIUM)
+        browser = browser()
         try:
-            browser.size(WIDTH, HEIGHT)
             for test in tests:
                 start = time.monotonic()
                 try:

@@ -1,4 +1,4 @@
-// One file for any browser: the page of web/ with VDIs inside. docs/page.md is for users.
+// One file for browsers: the page of web/ with VDIs inside. docs/page.md is for users.
 #pragma once
 
 #include <cstddef>
