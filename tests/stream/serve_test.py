@@ -215,6 +215,24 @@ class ServeTest(ServedFolder):
         for path in ("/small0.vdi", "//etc/passwd", "/../small0.vdi", "/%2e%2e/", "/stream", "/index.html", "/?"):
             self.assertEqual(server.get(path)[0].status, 404, path)
 
+    def test_http(self):
+        """Status codes for requests that aren't understood, and for other methods."""
+        server = self.serve(self.made / "small0.vdi")
+        host = b" HTTP/1.1\r\nHost: a\r\n"
+        cases = {b"hello\r\n\r\n": 400, b"GET / HTTP/1.1\r\nno field\r\n\r\n": 400, b"GET / HTTP/1.1\r\n\r\n": 400,
+                 b"GET /" + host + b"X: " + b"a" * 9000: 431, b"POST /" + host + b"\r\n": 405,
+                 b"POST /status" + host + b"Content-Length: 5\r\n\r\nhello": 405, b"DELETE /?a" + host + b"\r\n": 405,
+                 b"POST /x" + host + b"\r\n": 404, b"HEAD /" + host + b"\r\n": 200}
+        for request, status in cases.items():
+            with socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) as peer:
+                peer.sendall(request)
+                reply = peer.makefile("rb").read().decode()
+            self.assertTrue(reply.startswith(f"HTTP/1.1 {status} "), f"{request[:40]}: {reply[:80]}")
+            self.assertEqual("Allow: GET, HEAD" in reply, status == 405, reply)
+        for scheme in ("bearer", "BEARER", "Bearer  "):
+            self.assertEqual(server.get("/status", Authorization=f"{scheme} {server.token}")[0].status, 200, scheme)
+        self.assertEqual(server.get("/status", Authorization=f"Basic {server.token}")[0].status, 401)
+
     def test_a_head_without_an_end(self):
         server = self.serve(self.made / "small0.vdi")
         for line in (b"GET /", b"GET / HTTP/1.1\r\nX: "):

@@ -5,6 +5,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/core/string_type.hpp>
+#include <boost/beast/http/error.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/write.hpp>
@@ -80,10 +81,18 @@ class SocketConnection : public Connection, public std::enable_shared_from_this<
   Plain& transport() { return boost::beast::get_lowest_layer(socket_); }
 
   void readRequest() {
-    boost::beast::http::async_read(socket_.next_layer(), buffer_, parser_,
-                                   [self = shared_from_this()](Error error, std::size_t) {
-                                     if (!error) self->answer();
-                                   });
+    namespace http = boost::beast::http;
+    http::async_read(
+        socket_.next_layer(), buffer_, parser_, [self = shared_from_this()](Error error, std::size_t) {
+          if (error == http::error::end_of_stream || error == http::error::partial_message) return;
+          const HttpRequest& request = self->parser_.get();
+          const bool isWhole = !error && (request.version() < 11 || request.count(http::field::host) == 1);
+          if (isWhole) return self->answer();
+          // No request that the server knows has a body, so the reply depends on the head alone.
+          if (error == http::error::body_limit) return self->send(self->surroundings_.site.reply(request));
+          const bool isOfHttp = error.category() == http::make_error_code(http::error::bad_method).category();
+          if (!error || isOfHttp) self->send(Site::fault(error));
+        });
   }
 
   void answer() {

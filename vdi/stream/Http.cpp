@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/beast/core/string.hpp>
+#include <boost/beast/http/error.hpp>
 #include <boost/beast/http/field.hpp>
 #include <boost/beast/http/rfc7230.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
@@ -27,6 +29,17 @@ std::string_view plain(const View& view) {
 std::string_view field(const HttpRequest& request, http::field name) {
   const auto found = request.find(name);
   return found == request.end() ? std::string_view() : plain(found->value());
+}
+
+/// The credentials with their scheme, whose case doesn't matter, spelled as `scheme`. A blank ends `scheme`;
+/// the credentials may have several.
+std::string spelledAs(std::string_view scheme, std::string_view credentials) {
+  const auto found = credentials.substr(0, scheme.size());
+  if (!boost::beast::iequals({found.data(), found.size()}, {scheme.data(), scheme.size()}))
+    return std::string(credentials);
+  credentials.remove_prefix(scheme.size());
+  credentials.remove_prefix(std::min(credentials.find_first_not_of(' '), credentials.size()));
+  return std::string(scheme).append(credentials);
 }
 
 std::string sha256InBase64(std::string_view text) {
@@ -81,6 +94,16 @@ HttpReply Site::refusal(const HttpRequest& request, const std::string& cause) {
   return replyTo(request, http::status::forbidden, "text/plain; charset=utf-8", cause + "\n");
 }
 
+HttpReply Site::fault(boost::beast::error_code error) {
+  const HttpRequest none(http::verb::get, "", 11);  // HTTP/1.1
+  if (error == http::error::header_limit) {
+    return replyTo(none, http::status::request_header_fields_too_large, "text/plain; charset=utf-8",
+                   "the request's head is too large\n");
+  }
+  return replyTo(none, http::status::bad_request, "text/plain; charset=utf-8",
+                 "this isn't an HTTP request\n");
+}
+
 HttpReply Site::reply(const HttpRequest& request) const {
   const bool reads = request.method() == http::verb::get || request.method() == http::verb::head;
   const std::string_view target = plain(request.target());
@@ -91,12 +114,19 @@ HttpReply Site::reply(const HttpRequest& request) const {
   }
   if (reads && target == "/status") {
     constexpr std::string_view scheme = "Bearer ";
-    const std::string_view given = field(request, http::field::authorization);
+    const std::string given = spelledAs(scheme, field(request, http::field::authorization));
     if (given.starts_with(scheme) && token_.accepts(given.substr(scheme.size())))
       return replyTo(request, http::status::ok, "application/json", status_());
     HttpReply reply = replyTo(request, http::status::unauthorized, "text/plain; charset=utf-8",
                               "the status requires the token\n");
     reply.set(http::field::www_authenticate, "Bearer");
+    return reply;
+  }
+  const std::string_view resource = target.substr(0, target.find('?'));
+  if (!reads && (resource == "/" || resource == "/status" || resource == "/stream")) {
+    HttpReply reply = replyTo(request, http::status::method_not_allowed, "text/plain; charset=utf-8",
+                              "this server only answers GET and HEAD\n");
+    reply.set(http::field::allow, "GET, HEAD");
     return reply;
   }
   return replyTo(request, http::status::not_found, "text/plain; charset=utf-8", "not found\n");

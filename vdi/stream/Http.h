@@ -1,6 +1,7 @@
 // Answers plain HTTP requests, and decides which requests may open the stream. Uses no sockets.
 #pragma once
 
+#include <boost/beast/core/error.hpp>
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/http/string_body.hpp>
@@ -26,6 +27,8 @@ class Site {
   bool admits(const HttpRequest& request, std::string& cause) const;
   /// The reply to a request that isn't admitted.
   static HttpReply refusal(const HttpRequest& request, const std::string& cause);
+  /// The reply to what isn't a request, or one with too large a head. `error`: the parser's.
+  static HttpReply fault(boost::beast::error_code error);
 
  private:
   std::string page_;
