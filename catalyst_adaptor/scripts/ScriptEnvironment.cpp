@@ -48,8 +48,12 @@ PythonLock::PythonLock() {
 }
 
 PythonLock::~PythonLock() {
-  // ParaView's end is Python's end, too, if ParaView started it.
-  if (before_ && Py_IsInitialized() != 0) (PyGILState_Release)(static_cast<PyGILState_STATE>(*before_));
+  if (Py_IsInitialized() == 0) return;  // ParaView's end is Python's end, too, if ParaView started it
+  if (before_) {
+    (PyGILState_Release)(static_cast<PyGILState_STATE>(*before_));
+  } else {
+    PyEval_SaveThread();  // ParaView has started Python: the next call may be another thread's
+  }
 }
 
 }  // namespace vdi::catalyst

@@ -16,7 +16,8 @@ std::string pluginFile();
 void sharePython();
 
 /// Holds Python's lock during its lifetime if Python runs. A simulation in Python that calls through
-/// ctypes.CDLL has released the lock.
+/// ctypes.CDLL has released the lock. If Python starts during its lifetime, no thread holds the lock
+/// afterwards.
 class PythonLock {
  public:
   PythonLock();
