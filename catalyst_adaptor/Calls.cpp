@@ -59,6 +59,11 @@ void checkBlock(const vdi_catalyst_block& block) {
   requireCountable(block);
 }
 
+std::string& lastErrorText() {
+  thread_local std::string text;
+  return text;
+}
+
 /// Collective: the speaker's text on all ranks. A rank without memory for all of it gets its
 /// beginning, and doesn't leave other ranks waiting.
 std::string shared(MPI_Comm comm, std::string_view text, int speaker) {
@@ -98,12 +103,17 @@ int conclude(Calls& self, int code, std::string_view text, std::optional<std::in
   try {
     self.error = "rank " + std::to_string(speaker) + ": " +
                  (message.empty() ? "a script failed without a message" : message);
+    lastErrorText() = self.error;
     if (rank == 0) print(self, step);
   } catch (const std::bad_alloc&) {
-    self.error = "out of memory";  // fits into a string without an allocation
+    self.error = lastErrorText() = "out of memory";  // fits into a string without an allocation
     if (rank == 0) std::fputs("vdi_catalyst: out of memory\n", stderr);
   }
   return worst;
+}
+
+const char* lastError() noexcept {
+  return lastErrorText().c_str();
 }
 
 void requireEqual(MPI_Comm comm, std::int64_t value, const char* what) {

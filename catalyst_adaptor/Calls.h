@@ -33,6 +33,10 @@ struct Calls {
 /// memory, the text is shorter.
 int conclude(Calls& self, int code, std::string_view text, std::optional<std::int64_t> step) noexcept;
 
+/// The text of this thread's last failure, of whatever handle, for calls that leave no handle behind; "" if
+/// there was none. Valid until the next failure.
+const char* lastError() noexcept;
+
 /// Runs `work`, which returns nothing or the text of a failure. A failure or an exception becomes `code`.
 /// Never throws, even if there is no memory for the failure's text.
 template <typename Work>

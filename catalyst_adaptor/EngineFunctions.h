@@ -10,11 +10,13 @@
 extern "C" {
 #endif
 
-/* One entry for each function of vdi_catalyst.h, with the same contract. Of the first five entries, the
- * engine for scripts has the first three, the engine for JSON runs the last two, and the isolated engine the
- * first two and initialize_json. These entries get a valid communicator, and a null *catalyst. In the
- * isolated engine they return VDI_CATALYST_NOT_ISOLATED, on all ranks, for a run that another engine has to
- * carry out in this process.
+/* One entry for each function of vdi_catalyst.h, with the same contract. libvdi_catalyst.so passes only live
+ * handles, and makes one call of a handle at a time. `error` also takes null, for this thread's last error of
+ * any handle, also of one that is gone: its text is valid until the thread's next call. Of the first five
+ * entries, the engine for scripts has the first three, the engine for JSON runs the last two, and the
+ * isolated engine the first two and initialize_json. These entries get a valid communicator, and a null
+ * *catalyst. In the isolated engine they return VDI_CATALYST_NOT_ISOLATED, on all ranks, for a run that
+ * another engine has to carry out in this process.
  *
  * `make_frames_of_pipelines` and `make_frames_of_json` are initialize_pipelines and initialize_json in the
  * processes that make an isolated run's frames. If `goes_on`, earlier processes have made a part of the run,
@@ -47,8 +49,8 @@ typedef struct vdi_catalyst_functions {
 } vdi_catalyst_functions;
 
 /* An engine's only symbol. Its name contains the version, so a library of another version lacks it. */
-#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_10
-#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_10"
+#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_11
+#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_11"
 enum { VDI_CATALYST_NOT_ISOLATED = -1 };
 VDI_CATALYST_API extern const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS;
 

@@ -12,43 +12,40 @@ namespace vdi::catalyst {
 
 struct NoLock {};
 
-/// `usable` tells whether a handle is valid, `parametersOf` gives a valid handle's parameters, and each
-/// change of fields holds a `Lock`. `Handle` is the engine's vdi_catalyst, a FieldCalls.
-template <typename Handle, bool (*usable)(const Handle*), Parameters& (*parametersOf)(Handle&),
-          typename Lock = NoLock>
+/// `parametersOf` gives a handle's parameters, and each change of fields holds a `Lock`. `Handle` is the
+/// engine's vdi_catalyst, a FieldCalls.
+template <typename Handle, Parameters& (*parametersOf)(Handle&), typename Lock = NoLock>
 struct FieldEntries {
   static int setArray(Handle* handle, const char* name, std::int32_t type, std::int32_t association,
                       const void* const* data) {
-    if (!usable(handle)) return VDI_CATALYST_BAD_ARGUMENT;
     [[maybe_unused]] const Lock lock;
     return catalyst::setArray(*handle, {name, type, association, 1}, data);
   }
   static int setArrayStrided(Handle* handle, const char* name, std::int32_t type, std::int32_t association,
                              std::int32_t components, const void* const* data,
                              const vdi_catalyst_strides* strides) {
-    if (!usable(handle)) return VDI_CATALYST_BAD_ARGUMENT;
     [[maybe_unused]] const Lock lock;
     return catalyst::setArrayStrided(*handle, {name, type, association, components}, data, strides);
   }
   static int setArrayOffset(Handle* handle, const char* name, std::int32_t association,
                             const double* offset) {
-    if (!usable(handle)) return VDI_CATALYST_BAD_ARGUMENT;
     [[maybe_unused]] const Lock lock;
     return catalyst::setArrayOffset(*handle, name, association, offset);
   }
   static int setParticles(Handle* handle, const char* name, const vdi_catalyst_particles* particles) {
-    if (!usable(handle)) return VDI_CATALYST_BAD_ARGUMENT;
     [[maybe_unused]] const Lock lock;
     return catalyst::setParticles(*handle, name, particles);
   }
   static double parameterF64(Handle* handle, const char* name, double value, double low, double high) {
-    return usable(handle) ? inForce(*handle, parametersOf(*handle), name, value, low, high) : value;
+    return inForce(*handle, parametersOf(*handle), name, value, low, high);
   }
   static std::int64_t parameterI64(Handle* handle, const char* name, std::int64_t value, std::int64_t low,
                                    std::int64_t high) {
-    return usable(handle) ? inForce(*handle, parametersOf(*handle), name, value, low, high) : value;
+    return inForce(*handle, parametersOf(*handle), name, value, low, high);
   }
-  static const char* error(const Handle* handle) { return usable(handle) ? handle->error.c_str() : ""; }
+  static const char* error(const Handle* handle) {
+    return handle != nullptr ? handle->error.c_str() : lastError();
+  }
 
   /// An engine's table with these entries. All others are null.
   static constexpr vdi_catalyst_functions table() {

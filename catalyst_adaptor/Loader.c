@@ -3,6 +3,8 @@
 #include <dlfcn.h>
 #include <fenv.h>
 #include <mpi.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,7 +19,7 @@ enum { MESSAGE_SIZE = 4096, PATH_SIZE = 2048 };
 typedef struct vdi_engine {
   const char* file; /* in a folder beside this library */
   const char* needs;
-  const vdi_catalyst_functions* functions; /* null until it is loaded */
+  _Atomic(const vdi_catalyst_functions*) functions; /* null until it is loaded */
 } vdi_engine;
 
 /* A process has one of each, as it has one of each loaded library. */
@@ -30,18 +32,61 @@ static vdi_engine script_engine = {
 static vdi_engine json_engine = {VDI_CATALYST_JSON_FILE, "the Vulkan loader (Debian: libvulkan1)", NULL};
 static vdi_engine isolated_engine = {VDI_CATALYST_ISOLATED_FILE, "no other package", NULL};
 
-/* The engines of the two kinds of runs; null before the first run. */
-static vdi_engine* script_run;
-static vdi_engine* json_run;
-/* The JSON run's handle until it is finalized. All other handles belong to the run of scripts, whose engine
- * knows its own. */
-static const vdi_catalyst* json_handle;
+/* A run under way. A process has at most one of scripts and one of a JSON text. */
+typedef struct vdi_run {
+  const char* name;
+  vdi_engine* engine;            /* of the handle; unchanged while it lives */
+  _Atomic(vdi_catalyst*) handle; /* null: no run is under way. Any other handle has been finalized */
+  atomic_flag is_entered;        /* a thread initialises the run, or is in a call of its handle */
+} vdi_run;
+
+static vdi_run script_run = {"a run of scripts", NULL, NULL, ATOMIC_FLAG_INIT};
+static vdi_run json_run = {"a run without a script", NULL, NULL, ATOMIC_FLAG_INIT};
 /* The process that initialised first; 0: none has. A child that it forks has copies of its MPI connections,
  * its stream's sockets and its device, which don't work there, so no call reaches an engine. */
-static pid_t owner;
+static _Atomic(pid_t) owner;
 
 static int is_forked(void) {
-  return owner != 0 && owner != getpid();
+  const pid_t first = owner;
+  return first != 0 && first != getpid();
+}
+
+/* The texts that vdi_catalyst_error returns in this thread: copies, because another thread's call may change
+ * the engine's text meanwhile. */
+enum { OF_HANDLE, WITHOUT_HANDLE, TEXTS };
+static _Thread_local char* texts[TEXTS];
+/* The handle of this thread's last call if that was refused because of another thread's call; else null. */
+static _Thread_local const vdi_catalyst* refused;
+
+static pthread_key_t texts_key; /* its value is `texts` of a thread that has any */
+static pthread_once_t texts_once = PTHREAD_ONCE_INIT;
+
+static void free_texts(void* all) {
+  for (int i = 0; i < TEXTS; ++i) free(((char**)all)[i]);
+}
+
+static void make_texts_key(void) {
+  pthread_key_create(&texts_key, free_texts);
+}
+
+/* Returns the thread's own copy, or a shorter text if there is no memory for it. */
+static const char* keep_text(int which, const char* text) {
+  pthread_once(&texts_once, make_texts_key);
+  char* copy = pthread_setspecific(texts_key, texts) == 0 ? strdup(text) : NULL;
+  free(texts[which]);
+  texts[which] = copy;
+  return copy != NULL ? copy : "out of memory";
+}
+
+static const char busy_text[] =
+    "another thread is in a call of this handle, so this call was refused (VDI_CATALYST_BUSY)";
+
+/* Prints it once in a process. */
+static int refuse_busy(const vdi_catalyst* catalyst) {
+  static atomic_flag is_told = ATOMIC_FLAG_INIT;
+  refused = catalyst;
+  if (!atomic_flag_test_and_set(&is_told)) fprintf(stderr, "vdi_catalyst: %s\n", busy_text);
+  return VDI_CATALYST_BUSY;
 }
 
 /* Returns 0 if this library's own path is unknown or too long. */
@@ -65,8 +110,8 @@ static int load_engine(vdi_engine* wanted, char message[MESSAGE_SIZE]) {
   /* RTLD_LOCAL keeps the symbols of the engine's many libraries apart from the simulation's. */
   void* library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
   wanted->functions = library != NULL ? dlsym(library, VDI_CATALYST_ENGINE_SYMBOL) : NULL;
-  const char* reason = wanted->functions == NULL ? dlerror() : NULL;
   if (wanted->functions != NULL) return 0;
+  const char* reason = dlerror();
   snprintf(
       message, MESSAGE_SIZE,
       "the engine %s can't be loaded: %s; it needs %s, and libvdi_catalyst.so of the same version of pv-vdi",
@@ -95,8 +140,18 @@ static int failed_anywhere(MPI_Comm comm, int failed, char message[MESSAGE_SIZE]
   MPI_Allreduce(MPI_IN_PLACE, &speaker, 1, MPI_INT, MPI_MIN, comm);
   if (speaker == size) return 0;
   MPI_Bcast(message, MESSAGE_SIZE, MPI_CHAR, speaker, comm);
-  if (rank == 0) fprintf(stderr, "vdi_catalyst: rank %d: %s\n", speaker, message);
+  char text[MESSAGE_SIZE + 32];
+  snprintf(text, sizeof text, "rank %d: %s", speaker, message);
+  keep_text(WITHOUT_HANDLE, text);
+  if (rank == 0) fprintf(stderr, "vdi_catalyst: %s\n", text);
   return 1;
+}
+
+/* Prints why this rank can't initialise. Not collective. */
+static int refuse_initialize(const char* reason) {
+  keep_text(WITHOUT_HANDLE, reason);
+  fprintf(stderr, "vdi_catalyst: %s\n", reason);
+  return VDI_CATALYST_BAD_ARGUMENT;
 }
 
 /* Loads the engine on all ranks. Returns the code for the simulation. */
@@ -143,48 +198,58 @@ static int initialize_with(const vdi_engine* engine, int32_t communicator, const
   return engine->functions->make_frames_of_pipelines(communicator, given->count, given->pipelines, catalyst);
 }
 
-/* If the isolated engine may have to carry out the run, asks it first. */
-static int initialize_some(int32_t communicator, const vdi_given* given, vdi_engine** run,
-                           vdi_catalyst** catalyst) {
-  const MPI_Comm comm = communicator_of(communicator);
-  if (comm == MPI_COMM_NULL) {
-    fprintf(stderr, "vdi_catalyst: MPI isn't initialised, or the handle isn't a communicator's\n");
-    return VDI_CATALYST_BAD_ARGUMENT;
-  }
-  /* A JSON text may ask for isolation, too, and the isolated engine reads it. The engine of a JSON run under
-   * way refuses another one. */
-  const int goes_on = run == &json_run && json_handle != NULL;
-  vdi_engine* const own = run == &json_run ? &json_engine : &script_engine;
-  const int isolated =
-      goes_on ? *run == &isolated_engine
-              : given->kind == JSON_TEXT ||
-                    ((given->kind == SCRIPTS || given->kind == PIPELINES) && names_isolation(comm));
-  vdi_engine* tried = isolated ? &isolated_engine : own;
+static int initialize_by(vdi_engine* tried, MPI_Comm comm, int32_t communicator, const vdi_given* given,
+                         vdi_catalyst** catalyst) {
   int code = prepare(tried, comm);
-  if (code == VDI_CATALYST_OK) code = initialize_with(tried, communicator, given, catalyst);
-  if (code == VDI_CATALYST_NOT_ISOLATED) {
-    tried = own;
-    code = prepare(tried, comm);
-    if (code == VDI_CATALYST_OK) code = initialize_with(tried, communicator, given, catalyst);
-  }
-  if (code == VDI_CATALYST_OK) *run = tried;
+  if (code != VDI_CATALYST_OK) return code;
+  code = initialize_with(tried, communicator, given, catalyst);
+  if (code != VDI_CATALYST_OK && code != VDI_CATALYST_NOT_ISOLATED)
+    keep_text(WITHOUT_HANDLE, tried->functions->error(NULL));
   return code;
 }
 
-static int initialize(int32_t communicator, const vdi_given* given, vdi_engine** run,
-                      vdi_catalyst** catalyst) {
+/* If the isolated engine may have to carry out the run, asks it first: a JSON text may ask for isolation,
+ * too, and the isolated engine reads it. */
+static int initialize_some(int32_t communicator, const vdi_given* given, vdi_run* run,
+                           vdi_catalyst** catalyst) {
+  const MPI_Comm comm = communicator_of(communicator);
+  if (comm == MPI_COMM_NULL)
+    return refuse_initialize("MPI isn't initialised, or the handle isn't a communicator's");
+  char message[MESSAGE_SIZE];
+  snprintf(message, sizeof message, "%s is still active in this process; finalize it first", run->name);
+  if (failed_anywhere(comm, run->handle != NULL, message)) return VDI_CATALYST_ENGINE;
+  int code = VDI_CATALYST_NOT_ISOLATED;
+  if (given->kind == JSON_TEXT ||
+      ((given->kind == SCRIPTS || given->kind == PIPELINES) && names_isolation(comm))) {
+    run->engine = &isolated_engine;
+    code = initialize_by(run->engine, comm, communicator, given, catalyst);
+  }
+  if (code == VDI_CATALYST_NOT_ISOLATED) {
+    run->engine = run == &json_run ? &json_engine : &script_engine;
+    code = initialize_by(run->engine, comm, communicator, given, catalyst);
+  }
+  return code;
+}
+
+static int initialize(int32_t communicator, const vdi_given* given, vdi_run* run, vdi_catalyst** catalyst) {
   if (catalyst == NULL) return VDI_CATALYST_BAD_ARGUMENT;
   *catalyst = NULL;
-  if (is_forked()) {
-    fprintf(stderr, "vdi_catalyst: a process forked after vdi_catalyst_initialize can't call it again\n");
-    return VDI_CATALYST_BAD_ARGUMENT;
-  }
+  if (is_forked())
+    return refuse_initialize("a process forked after vdi_catalyst_initialize can't call it again");
   owner = getpid();
+  if (atomic_flag_test_and_set_explicit(&run->is_entered, memory_order_acquire)) {
+    keep_text(WITHOUT_HANDLE, busy_text);
+    return refuse_busy(NULL);
+  }
   vdi_process_state state;
   vdi_process_state_save(&state);
   const int code = initialize_some(communicator, given, run, catalyst);
-  if (code == VDI_CATALYST_OK && run == &json_run) json_handle = *catalyst;
+  if (code == VDI_CATALYST_OK) {
+    keep_text(WITHOUT_HANDLE, "");
+    run->handle = *catalyst;
+  }
   vdi_process_state_restore(&state);
+  atomic_flag_clear_explicit(&run->is_entered, memory_order_release);
   return code;
 }
 
@@ -217,37 +282,52 @@ int vdi_catalyst_make_frames_of_pipelines(int32_t fortran_communicator, int32_t 
   return initialize(fortran_communicator, &given, &script_run, catalyst);
 }
 
-/* The engine for this handle; null if none may be called. Without an engine there are no handles. */
-static const vdi_engine* engine_of(const vdi_catalyst* catalyst) {
+static vdi_run* run_of(const vdi_catalyst* catalyst) {
+  if (catalyst == NULL) return NULL;
+  if (catalyst == json_run.handle) return &json_run;
+  return catalyst == script_run.handle ? &script_run : NULL;
+}
+
+/* Begins a call of the handle, which `leave` ends. Returns null if the call must be refused, by the code
+ * `*refusal`. */
+static vdi_run* enter(const vdi_catalyst* catalyst, int* refusal) {
   int over = 0;
   MPI_Finalized(&over);
-  if (over || catalyst == NULL || is_forked()) return NULL;
-  return catalyst == json_handle ? json_run : script_run;
+  *refusal = VDI_CATALYST_BAD_ARGUMENT;
+  refused = NULL;
+  vdi_run* const run = over || is_forked() ? NULL : run_of(catalyst);
+  if (run == NULL) return NULL;
+  if (atomic_flag_test_and_set_explicit(&run->is_entered, memory_order_acquire)) {
+    *refusal = refuse_busy(catalyst);
+    return NULL;
+  }
+  if (run->handle == catalyst) return run;
+  atomic_flag_clear_explicit(&run->is_entered, memory_order_release); /* finalized in the meantime */
+  return NULL;
 }
 
-static const vdi_catalyst_functions* functions_of(const vdi_catalyst* catalyst) {
-  const vdi_engine* engine = engine_of(catalyst);
-  return engine != NULL ? engine->functions : NULL;
+static void leave(vdi_run* run) {
+  refused = NULL; /* a call within this one, of a signal's handler, was an earlier one */
+  atomic_flag_clear_explicit(&run->is_entered, memory_order_release);
 }
 
-/* The part of the process's state that a call may change, and that it restores. The isolated engine runs only
- * our own code here, which changes nothing but the floating-point environment. */
+/* The state that a call restores: `all` of the process's, or only the floating-point environment. */
 typedef struct vdi_saved {
   int all;
   vdi_process_state state;
   fenv_t floating_point;
 } vdi_saved;
 
-static void save(const vdi_engine* engine, vdi_saved* saved) {
-  saved->all = engine != &isolated_engine;
-  if (saved->all) {
+static void save(int all, vdi_saved* saved) {
+  saved->all = all;
+  if (all) {
     vdi_process_state_save(&saved->state);
   } else {
     feholdexcept(&saved->floating_point);
   }
 }
 
-static void restore(vdi_saved* saved) {
+static void restore(const vdi_saved* saved) {
   if (saved->all) {
     vdi_process_state_restore(&saved->state);
   } else {
@@ -255,80 +335,86 @@ static void restore(vdi_saved* saved) {
   }
 }
 
-/* The body of a function that calls the engine's entry, if there is one. These entries run only our own code,
- * which changes nothing but the floating-point environment. */
-#define RETURN_CALL(type, without_engine, call)                  \
-  const vdi_catalyst_functions* engine = functions_of(catalyst); \
-  if (engine == NULL) return (without_engine);                   \
-  fenv_t floating_point;                                         \
-  feholdexcept(&floating_point);                                 \
-  const type result = engine->call;                              \
-  fesetenv(&floating_point);                                     \
+/* The body of a function that calls the engine's entry. If the call is refused, by the code `refusal`, it
+ * returns `otherwise`. */
+#define RETURN_RESTORED(type, otherwise, all, call) \
+  int refusal;                                      \
+  vdi_run* const run = enter(catalyst, &refusal);   \
+  if (run == NULL) return (otherwise);              \
+  vdi_saved saved;                                  \
+  save((all), &saved);                              \
+  const type result = run->engine->functions->call; \
+  restore(&saved);                                  \
+  leave(run);                                       \
   return result
 
+/* For entries that run only our own code, which changes nothing but the floating-point environment. */
+#define RETURN_CALL(type, otherwise, call) RETURN_RESTORED(type, otherwise, 0, call)
+/* For entries that run other code, too, unless the isolated engine has them. */
+#define RETURN_GUARDED_CALL(otherwise, call) \
+  RETURN_RESTORED(int, otherwise, run->engine != &isolated_engine, call)
+
 int vdi_catalyst_set_blocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
-  RETURN_CALL(int, VDI_CATALYST_BAD_ARGUMENT, set_blocks(catalyst, count, blocks));
+  RETURN_CALL(int, refusal, set_blocks(catalyst, count, blocks));
 }
 
 int vdi_catalyst_set_array(vdi_catalyst* catalyst, const char* name, int32_t type, int32_t association,
                            const void* const* data) {
-  RETURN_CALL(int, VDI_CATALYST_BAD_ARGUMENT, set_array(catalyst, name, type, association, data));
+  RETURN_CALL(int, refusal, set_array(catalyst, name, type, association, data));
 }
 
 int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int32_t type,
                                    int32_t association, int32_t components, const void* const* data,
                                    const vdi_catalyst_strides* strides) {
-  RETURN_CALL(int, VDI_CATALYST_BAD_ARGUMENT,
-              set_array_strided(catalyst, name, type, association, components, data, strides));
+  RETURN_CALL(int, refusal, set_array_strided(catalyst, name, type, association, components, data, strides));
 }
 
 int vdi_catalyst_set_array_offset(vdi_catalyst* catalyst, const char* name, int32_t association,
                                   const double offset[3]) {
-  RETURN_CALL(int, VDI_CATALYST_BAD_ARGUMENT, set_array_offset(catalyst, name, association, offset));
+  RETURN_CALL(int, refusal, set_array_offset(catalyst, name, association, offset));
 }
 
 int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const char* name,
                                const vdi_catalyst_particles* particles) {
-  RETURN_CALL(int, VDI_CATALYST_BAD_ARGUMENT, set_particles(catalyst, name, particles));
+  RETURN_CALL(int, refusal, set_particles(catalyst, name, particles));
 }
 
 int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time) {
-  const vdi_engine* engine = engine_of(catalyst);
-  if (engine == NULL) return 0;
-  vdi_saved saved;
-  save(engine, &saved);
-  const int wants = engine->functions->wants(catalyst, step, time);
-  restore(&saved);
-  return wants;
+  RETURN_GUARDED_CALL(0, wants(catalyst, step, time));
 }
 
 int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, double time) {
-  const vdi_engine* engine = engine_of(catalyst);
-  if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
-  vdi_saved saved;
-  save(engine, &saved);
-  const int code = engine->functions->execute(catalyst, step, time);
-  restore(&saved);
-  return code;
+  RETURN_GUARDED_CALL(refusal, execute(catalyst, step, time));
 }
 
 void vdi_catalyst_wanted_steps(vdi_catalyst* catalyst, int64_t first, int32_t count, uint8_t* wanted) {
-  const vdi_engine* engine = engine_of(catalyst);
-  if (engine == NULL || engine->functions->wanted_steps == NULL) return;
-  vdi_saved saved;
-  save(engine, &saved);
-  engine->functions->wanted_steps(catalyst, first, count, wanted);
-  restore(&saved);
+  int refusal;
+  vdi_run* const run = enter(catalyst, &refusal);
+  if (run == NULL) return;
+  if (run->engine->functions->wanted_steps != NULL) {
+    vdi_saved saved;
+    save(run->engine != &isolated_engine, &saved);
+    run->engine->functions->wanted_steps(catalyst, first, count, wanted);
+    restore(&saved);
+  }
+  leave(run);
 }
 
 void vdi_catalyst_set_clock(vdi_catalyst* catalyst, double seconds) {
-  const vdi_catalyst_functions* engine = functions_of(catalyst);
-  if (engine != NULL && engine->set_clock != NULL) engine->set_clock(catalyst, seconds);
+  int refusal;
+  vdi_run* const run = enter(catalyst, &refusal);
+  if (run == NULL) return;
+  if (run->engine->functions->set_clock != NULL) run->engine->functions->set_clock(catalyst, seconds);
+  leave(run);
 }
 
 void vdi_catalyst_log_left_out(vdi_catalyst* catalyst, int64_t step, double time) {
-  const vdi_catalyst_functions* engine = functions_of(catalyst);
-  if (engine != NULL && engine->log_left_out != NULL) engine->log_left_out(catalyst, step, time);
+  int refusal;
+  vdi_run* const run = enter(catalyst, &refusal);
+  if (run == NULL) return;
+  if (run->engine->functions->log_left_out != NULL)
+    run->engine->functions->log_left_out(catalyst, step, time);
+  leave(run);
 }
 
 double vdi_catalyst_parameter_f64(vdi_catalyst* catalyst, const char* name, double value, double low,
@@ -345,19 +431,28 @@ int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
   if (catalyst != NULL && is_forked()) return VDI_CATALYST_OK; /* the run ends in the process that began it */
   int over = 0;
   MPI_Finalized(&over);
-  if (over && catalyst != NULL && (script_run != NULL || json_run != NULL))
+  if (over && catalyst != NULL && owner != 0)
     fprintf(stderr, "vdi_catalyst: vdi_catalyst_finalize comes after MPI_Finalize, so nothing is ended\n");
-  const vdi_catalyst_functions* engine = functions_of(catalyst);
-  if (engine == NULL) return VDI_CATALYST_BAD_ARGUMENT;
+  int refusal;
+  vdi_run* const run = enter(catalyst, &refusal);
+  if (run == NULL) return refusal;
   vdi_process_state state;
   vdi_process_state_save(&state);
-  const int code = engine->finalize(catalyst);
-  if (catalyst == json_handle) json_handle = NULL;
+  const int code = run->engine->functions->finalize(catalyst);
+  if (code != VDI_CATALYST_OK) keep_text(WITHOUT_HANDLE, run->engine->functions->error(NULL));
+  run->handle = NULL;
   vdi_process_state_restore(&state);
+  leave(run);
   return code;
 }
 
 const char* vdi_catalyst_error(const vdi_catalyst* catalyst) {
-  const vdi_catalyst_functions* engine = functions_of(catalyst);
-  return engine != NULL ? engine->error(catalyst) : "";
+  if (catalyst == NULL) return texts[WITHOUT_HANDLE] != NULL ? texts[WITHOUT_HANDLE] : "";
+  if (catalyst == refused && run_of(catalyst) != NULL) return busy_text;
+  int refusal;
+  vdi_run* const run = enter(catalyst, &refusal);
+  if (run == NULL) return refusal == VDI_CATALYST_BUSY ? busy_text : "";
+  const char* const text = keep_text(OF_HANDLE, run->engine->functions->error(catalyst));
+  leave(run);
+  return text;
 }

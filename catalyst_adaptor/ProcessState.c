@@ -1,11 +1,28 @@
 #include "catalyst_adaptor/ProcessState.h"
 
 #include <fcntl.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/types.h>
 #include <unistd.h>
+
+enum { VDI_SIGNALS = 65 };
+
+/* The part that belongs to the whole process. */
+static struct {
+  struct sigaction actions[VDI_SIGNALS]; /* by signal; [0] is unused */
+  char* locale;                          /* null: unknown, because there was no memory */
+  char** environment;                    /* null-terminated copies; null: no memory */
+  int folder;                            /* a descriptor; -1: unknown */
+  mode_t umask;
+  struct rlimit limits[RLIM_NLIMITS];
+} process;
+static int users; /* calls under way, each of which is to restore it */
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 
 /* The variables that scripts have set ("NAME=value") or removed ("NAME"), null-terminated; null at first.
  * There is one list a process, as there is one environment. */
@@ -133,16 +150,15 @@ static mode_t current_umask(void) {
   return before;
 }
 
-static void save_signals(vdi_process_state* state) {
+static void save_actions(void) {
   for (int i = 1; i < VDI_SIGNALS; ++i) {
     /* libc reserves some signals, for which it returns an error. */
-    if (sigaction(i, NULL, &state->actions[i]) != 0) memset(&state->actions[i], 0, sizeof state->actions[i]);
+    if (sigaction(i, NULL, &process.actions[i]) != 0)
+      memset(&process.actions[i], 0, sizeof process.actions[i]);
   }
-  pthread_sigmask(SIG_SETMASK, NULL, &state->blocked);
-  if (sigaltstack(NULL, &state->signal_stack) != 0) state->signal_stack.ss_flags = SS_ONSTACK;
   /* A write to a closed pipe or beyond the file size limit then returns an error. */
-  if (state->actions[SIGPIPE].sa_handler == SIG_DFL) signal(SIGPIPE, SIG_IGN);
-  if (state->actions[SIGXFSZ].sa_handler == SIG_DFL) signal(SIGXFSZ, SIG_IGN);
+  if (process.actions[SIGPIPE].sa_handler == SIG_DFL) signal(SIGPIPE, SIG_IGN);
+  if (process.actions[SIGXFSZ].sa_handler == SIG_DFL) signal(SIGXFSZ, SIG_IGN);
 }
 
 static int same_mask(const sigset_t* a, const sigset_t* b) {
@@ -152,9 +168,9 @@ static int same_mask(const sigset_t* a, const sigset_t* b) {
   return 1;
 }
 
-static void restore_signals(const vdi_process_state* state) {
+static void restore_actions(void) {
   for (int i = 1; i < VDI_SIGNALS; ++i) {
-    const struct sigaction* before = &state->actions[i];
+    const struct sigaction* before = &process.actions[i];
     struct sigaction now;
     if (sigaction(i, NULL, &now) != 0) continue;
     if (now.sa_sigaction == before->sa_sigaction && now.sa_flags == before->sa_flags &&
@@ -162,24 +178,26 @@ static void restore_signals(const vdi_process_state* state) {
       continue;
     sigaction(i, before, NULL);
   }
-  pthread_sigmask(SIG_SETMASK, &state->blocked, NULL);
-  stack_t stack;
-  /* A signal's handler can't change the stack that it runs on, nor can the functions that it calls. */
-  if ((state->signal_stack.ss_flags & SS_ONSTACK) == 0 && sigaltstack(NULL, &stack) == 0 &&
-      (stack.ss_sp != state->signal_stack.ss_sp || stack.ss_flags != state->signal_stack.ss_flags))
-    sigaltstack(&state->signal_stack, NULL);
 }
 
-static void restore_locale(vdi_process_state* state) {
+static void restore_stack(const stack_t* before) {
+  stack_t now;
+  /* A signal's handler can't change the stack that it runs on, nor can the functions that it calls. */
+  if ((before->ss_flags & SS_ONSTACK) == 0 && sigaltstack(NULL, &now) == 0 &&
+      (now.ss_sp != before->ss_sp || now.ss_flags != before->ss_flags))
+    sigaltstack(before, NULL);
+}
+
+static void restore_locale(void) {
   uselocale(LC_GLOBAL_LOCALE);
   const char* now = setlocale(LC_ALL, NULL);
-  const int same = now != NULL && state->locale != NULL && strcmp(now, state->locale) == 0;
-  if (!same && (state->locale == NULL || setlocale(LC_ALL, state->locale) == NULL)) complain("the locale");
-  uselocale(state->thread_locale);
-  free(state->locale);
+  const int same = now != NULL && process.locale != NULL && strcmp(now, process.locale) == 0;
+  if (!same && (process.locale == NULL || setlocale(LC_ALL, process.locale) == NULL)) complain("the locale");
+  free(process.locale);
 }
 
-static void restore_folder(int folder) {
+static void restore_folder(void) {
+  const int folder = process.folder;
   struct stat before;
   struct stat now;
   const int known = folder >= 0 && fstat(folder, &before) == 0;
@@ -189,35 +207,52 @@ static void restore_folder(int folder) {
   if (folder >= 0) close(folder);
 }
 
-static void restore_limits(const struct rlimit* limits) {
+static void restore_limits(void) {
   for (int i = 0; i < RLIM_NLIMITS; ++i) {
     struct rlimit now;
-    if (getrlimit((__rlimit_resource_t)i, &now) != 0 || now.rlim_cur == limits[i].rlim_cur) continue;
-    now.rlim_cur = limits[i].rlim_cur; /* a lowered hard limit can't be raised again */
+    if (getrlimit((__rlimit_resource_t)i, &now) != 0 || now.rlim_cur == process.limits[i].rlim_cur) continue;
+    now.rlim_cur = process.limits[i].rlim_cur; /* a lowered hard limit can't be raised again */
     if (setrlimit((__rlimit_resource_t)i, &now) != 0) complain("a limit of resources");
   }
+}
+
+static void save_process(void) {
+  save_actions();
+  const char* locale = setlocale(LC_ALL, NULL);
+  process.locale = locale != NULL ? strdup(locale) : NULL;
+  process.environment = copy_of(environ);
+  apply_all(kept);
+  process.folder = open(".", O_PATH | O_DIRECTORY | O_CLOEXEC);
+  process.umask = current_umask();
+  for (int i = 0; i < RLIM_NLIMITS; ++i) getrlimit((__rlimit_resource_t)i, &process.limits[i]);
+}
+
+static void restore_process(void) {
+  restore_limits();
+  if (current_umask() != process.umask) umask(process.umask);
+  restore_folder();
+  restore_environment(process.environment);
+  restore_locale();
+  restore_actions();
 }
 
 void vdi_process_state_save(vdi_process_state* state) {
   fegetenv(&state->floating_point);
   fesetenv(FE_DFL_ENV);
-  save_signals(state);
-  state->thread_locale = uselocale((locale_t)0);
-  const char* locale = setlocale(LC_ALL, NULL);
-  state->locale = locale != NULL ? strdup(locale) : NULL;
-  state->environment = copy_of(environ);
-  apply_all(kept);
-  state->folder = open(".", O_PATH | O_DIRECTORY | O_CLOEXEC);
-  state->umask = current_umask();
-  for (int i = 0; i < RLIM_NLIMITS; ++i) getrlimit((__rlimit_resource_t)i, &state->limits[i]);
+  pthread_sigmask(SIG_SETMASK, NULL, &state->blocked);
+  if (sigaltstack(NULL, &state->signal_stack) != 0) state->signal_stack.ss_flags = SS_ONSTACK;
+  state->locale = uselocale((locale_t)0);
+  pthread_mutex_lock(&lock);
+  if (users++ == 0) save_process();
+  pthread_mutex_unlock(&lock);
 }
 
-void vdi_process_state_restore(vdi_process_state* state) {
-  restore_limits(state->limits);
-  if (current_umask() != state->umask) umask(state->umask);
-  restore_folder(state->folder);
-  restore_environment(state->environment);
-  restore_locale(state);
-  restore_signals(state);
+void vdi_process_state_restore(const vdi_process_state* state) {
+  pthread_mutex_lock(&lock);
+  if (--users == 0) restore_process();
+  pthread_mutex_unlock(&lock);
+  uselocale(state->locale);
+  restore_stack(&state->signal_stack);
+  pthread_sigmask(SIG_SETMASK, &state->blocked, NULL);
   fesetenv(&state->floating_point);
 }

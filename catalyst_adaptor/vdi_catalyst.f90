@@ -14,6 +14,7 @@ module vdi_catalyst
     enumerator :: vdi_catalyst_bad_argument = 1
     enumerator :: vdi_catalyst_engine = 2
     enumerator :: vdi_catalyst_script = 3
+    enumerator :: vdi_catalyst_busy = 4
   end enum
 
   integer(c_int32_t), parameter :: vdi_catalyst_u8 = 0

@@ -17,6 +17,12 @@
  * All functions but vdi_catalyst_error are collective over the communicator: each rank makes all calls in the
  * same order, even a rank without blocks (count 0, null pointers).
  *
+ * The calls of a handle come one after another, from any thread. A call that begins before another one of the
+ * same handle has returned, in another thread, a signal's handler or a script, does nothing and returns
+ * VDI_CATALYST_BUSY, even vdi_catalyst_finalize. Such a call hasn't met those of other ranks: make it again
+ * later. The process prints this once. Two handles, of scripts and of a JSON text, may be used by two threads
+ * at once if MPI provides MPI_THREAD_MULTIPLE.
+ *
  * No call ends the process on purpose; the exceptions are below. The functions return
  * VDI_CATALYST_OK or a code below, the same one on all ranks, and rank 0 prints a message to standard error.
  * Rank 0 prints a repeated message in full only once. A step that fails again gets one line, because its
@@ -81,8 +87,9 @@ enum {
   VDI_CATALYST_ENGINE = 2, /* ParaView can't be loaded or started, or was started before in this process; a
                             * JSON run finds no Vulkan device, or another JSON run goes on; the processes
                             * that make the frames can't be started, or have died */
-  VDI_CATALYST_SCRIPT = 3  /* a script, or a filter or extractor in it, failed; the others went on. JSON: the
+  VDI_CATALYST_SCRIPT = 3, /* a script, or a filter or extractor in it, failed; the others went on. JSON: the
                             * text or a file that it names is wrong, or a frame couldn't be made or written */
+  VDI_CATALYST_BUSY = 4    /* another call of this handle hasn't returned yet. Only this rank knows of it */
 };
 
 /* Scalar types. */
@@ -285,7 +292,8 @@ VDI_CATALYST_API int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const ch
  *   - if a frame is due by step, time or clock, whether or not "when", "max_share" and "max_host_mib" will
  *     permit it;
  *   - at each step if viewers may steer.
- * It is 0 for a null or finalized handle and for a step that vdi_catalyst_execute refuses. */
+ * It is 0 for a null or finalized handle and for a step that vdi_catalyst_execute refuses, and while another
+ * call of the handle is under way. */
 VDI_CATALYST_API int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time);
 
 /* Makes what the scripts or the JSON text ask for at this step, of the blocks, arrays and particles as they
@@ -303,9 +311,10 @@ VDI_CATALYST_API int vdi_catalyst_execute(vdi_catalyst* catalyst, int64_t step, 
  * between two steps return the same value. Later calls ignore value and bounds.
  *
  * A run has 64 parameters at most. Bounds of the second function lie within 2^53 of 0. The functions return
- * `value` for a null or finalized handle, and after an error, which vdi_catalyst_error describes: an invalid
- * name, bounds that aren't finite, a value outside them, another type than before, or ranks that ask for
- * different parameters. After a success, vdi_catalyst_error returns "". */
+ * `value` for a null or finalized handle, and after an error (VDI_CATALYST_BUSY, too), which
+ * vdi_catalyst_error describes: an invalid name, bounds that aren't finite, a value outside them, another
+ * type than before, or ranks that ask for different parameters. After a success, vdi_catalyst_error returns
+ * "". */
 VDI_CATALYST_API double vdi_catalyst_parameter_f64(vdi_catalyst* catalyst, const char* name, double value,
                                                    double low, double high);
 VDI_CATALYST_API int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, const char* name, int64_t value,
@@ -318,9 +327,11 @@ VDI_CATALYST_API int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, cons
  * to the process that began it. */
 VDI_CATALYST_API int vdi_catalyst_finalize(vdi_catalyst* catalyst);
 
-/* The text of the last error on this rank; "" if there was none, if a parameter was asked for since then, and
- * for a null or finalized handle. Not collective. The engine owns the text, which is valid until the next
- * call. */
+/* The text of the handle's last error on this rank; "" if there was none, if a parameter was asked for since
+ * then, and for a finalized handle. After a call of this thread that returned VDI_CATALYST_BUSY, and while
+ * another call is under way, it says so. For null it is the reason why this thread's last initialising or
+ * finalizing failed; "" if it didn't. Not collective. The library owns the text, which is valid until this
+ * thread's next call. */
 VDI_CATALYST_API const char* vdi_catalyst_error(const vdi_catalyst* catalyst);
 
 #ifdef __cplusplus

@@ -3,6 +3,7 @@
 #include <catalyst_stub.h>
 #include <mpi.h>
 
+#include <atomic>
 #include <cstdio>
 #include <exception>
 #include <memory>
@@ -24,7 +25,11 @@ std::unique_ptr<Session>& session() {
   return one;
 }
 
-/// 100 for invalid input, as in ParaView's implementation; 102 and 103 for VDI_CATALYST_ENGINE and _SCRIPT.
+/// Whether a thread is in a call that uses the session.
+constinit std::atomic_flag entered;
+
+/// 100 for invalid input, as in ParaView's implementation; 102, 103 and 104 for VDI_CATALYST_ENGINE, _SCRIPT
+/// and _BUSY.
 /// Catalyst's own codes are lower.
 catalyst_status statusOf(int code) {
   if (code == VDI_CATALYST_OK) return catalyst_status_ok;
@@ -46,6 +51,18 @@ catalyst_status run(const conduit_node* params, Work work) {
   return statusOf(VDI_CATALYST_BAD_ARGUMENT);
 }
 
+/// Does the work unless another call does its own.
+template <typename Work>
+catalyst_status alone(Work work) {
+  if (entered.test_and_set(std::memory_order_acquire)) {
+    std::fprintf(stderr, "vdi_catalyst: another thread is in a call of Catalyst, so this call was refused\n");
+    return statusOf(VDI_CATALYST_BUSY);
+  }
+  const catalyst_status status = work();
+  entered.clear(std::memory_order_release);
+  return status;
+}
+
 /// The communicator, as ParaView's implementation takes it: a Fortran handle, or all ranks of the simulation.
 MPI_Comm communicatorOf(const Node& params) {
   int running = 0;
@@ -64,31 +81,39 @@ MPI_Comm communicatorOf(const Node& params) {
 }  // namespace
 
 catalyst_status catalyst_initialize_vdi(const conduit_node* params) {
-  return run(params, [](const Node& node) {
-    if (session()) throw std::runtime_error("catalyst_initialize was called before; finalize first");
-    auto own = std::make_unique<Session>(communicatorOf(node));
-    const int code = own->initialize(node);
-    if (code == VDI_CATALYST_OK) session() = std::move(own);
-    return code;
+  return alone([&] {
+    return run(params, [](const Node& node) {
+      if (session()) throw std::runtime_error("catalyst_initialize was called before; finalize first");
+      auto own = std::make_unique<Session>(communicatorOf(node));
+      const int code = own->initialize(node);
+      if (code == VDI_CATALYST_OK) session() = std::move(own);
+      return code;
+    });
   });
 }
 
 catalyst_status catalyst_execute_vdi(const conduit_node* params) {
-  // catalyst_initialize has reported why there is no session.
-  if (!session()) return statusOf(VDI_CATALYST_BAD_ARGUMENT);
-  return run(params, [](const Node& node) { return session()->execute(node); });
+  return alone([&] {
+    // catalyst_initialize has reported why there is no session.
+    if (!session()) return statusOf(VDI_CATALYST_BAD_ARGUMENT);
+    return run(params, [](const Node& node) { return session()->execute(node); });
+  });
 }
 
 catalyst_status catalyst_results_vdi(conduit_node* params) {
-  if (!session()) return statusOf(VDI_CATALYST_BAD_ARGUMENT);
-  return run(params, [&](const Node&) { return session()->results(params); });
+  return alone([&] {
+    if (!session()) return statusOf(VDI_CATALYST_BAD_ARGUMENT);
+    return run(params, [&](const Node&) { return session()->results(params); });
+  });
 }
 
 catalyst_status catalyst_finalize_vdi(const conduit_node*) {
-  if (!session()) return statusOf(VDI_CATALYST_BAD_ARGUMENT);
-  const int code = session()->finalize();
-  session().reset();
-  return statusOf(code);
+  return alone([] {
+    if (!session()) return statusOf(VDI_CATALYST_BAD_ARGUMENT);
+    const int code = session()->finalize();
+    session().reset();
+    return statusOf(code);
+  });
 }
 
 catalyst_status catalyst_about_vdi(conduit_node* params) {

@@ -2,7 +2,6 @@
 // keeps the ranks together.
 #include <mpi.h>
 
-#include <array>
 #include <memory>
 #include <new>
 #include <optional>
@@ -28,18 +27,6 @@ namespace {
 
 using vdi::catalyst::guarded;
 using vdi::catalyst::IsolatedOptions;
-using vdi::catalyst::require;
-
-/// The live handle of a run of scripts or of a JSON run. Any other handle has been finalized, and must
-/// not be read.
-vdi_catalyst*& alive(bool isJson) {
-  static std::array<vdi_catalyst*, 2> handles{};
-  return handles[isJson ? 1 : 0];
-}
-
-bool usable(const vdi_catalyst* catalyst) {
-  return catalyst != nullptr && (catalyst == alive(false) || catalyst == alive(true));
-}
 
 std::optional<double> patienceFromEnvironment() {
   const std::optional<std::uint32_t> seconds = vdi::environmentCount("VDI_ISOLATION_PATIENCE", 0);
@@ -139,19 +126,12 @@ int initializeAny(int32_t fortran_communicator, const char* json, bool isJson, v
   if (code == VDI_CATALYST_OK) code = guarded(*self, VDI_CATALYST_BAD_ARGUMENT, [&] { read(options); });
   if (code == VDI_CATALYST_OK) {
     code = guarded(*self, VDI_CATALYST_ENGINE, [&] {
-      require(alive(isJson) == nullptr,
-              isJson ? "a run without a script is still active in this process; finalize it first"
-                     : "a run of scripts is still active in this process; finalize it first");
-    });
-  }
-  if (code == VDI_CATALYST_OK) {
-    code = guarded(*self, VDI_CATALYST_ENGINE, [&] {
       self->run = std::make_unique<vdi::catalyst::IsolatedRun>(*self, std::move(options));
     });
   }
   if (code == VDI_CATALYST_OK) code = self->run->start();
   if (code == VDI_CATALYST_OK) {
-    *catalyst = alive(isJson) = self.release();
+    *catalyst = self.release();
   } else {
     MPI_Comm_free(&self->comm);
   }
@@ -188,18 +168,17 @@ void requireMarks(int32_t count, const vdi_catalyst_block* blocks) {
 }
 
 int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   return vdi::catalyst::setBlocks(*catalyst, count, blocks, [&] {
     if (!catalyst->isJson) requireMarks(count, blocks);
   });
 }
 
 int wants(vdi_catalyst* catalyst, int64_t step, double time) {
-  return usable(catalyst) && catalyst->run->wants(step, time) ? 1 : 0;
+  return catalyst->run->wants(step, time) ? 1 : 0;
 }
 
 int execute(vdi_catalyst* catalyst, int64_t step, double time) {
-  return usable(catalyst) ? catalyst->run->execute(step, time) : VDI_CATALYST_BAD_ARGUMENT;
+  return catalyst->run->execute(step, time);
 }
 
 vdi::catalyst::Parameters& parametersOf(vdi_catalyst& catalyst) {
@@ -207,15 +186,14 @@ vdi::catalyst::Parameters& parametersOf(vdi_catalyst& catalyst) {
 }
 
 int finalize(vdi_catalyst* catalyst) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  const std::unique_ptr<vdi_catalyst> self(std::exchange(alive(catalyst->isJson), nullptr));
+  const std::unique_ptr<vdi_catalyst> self(catalyst);
   const int code = self->run->finish();
   self->run.reset();
   MPI_Comm_free(&self->comm);
   return code;
 }
 
-using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable, parametersOf>;
+using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, parametersOf>;
 
 }  // namespace
 

@@ -27,16 +27,6 @@ using vdi::catalyst::guarded;
 using vdi::catalyst::guardedTogether;
 using vdi::catalyst::require;
 
-/// The live handle. Any other handle has been finalized, and must not be read.
-vdi_catalyst*& alive() {
-  static vdi_catalyst* handle = nullptr;
-  return handle;
-}
-
-bool usable(const vdi_catalyst* catalyst) {
-  return catalyst != nullptr && catalyst == alive();
-}
-
 /// Reads the run that rank 0 names. Rank 0 reads the files, and all others get their text.
 class Reading {
  public:
@@ -91,13 +81,9 @@ class Reading {
 enum class FrameMaker { Simulation, Process, NextProcess };
 
 int start(vdi_catalyst& self, const char* json, FrameMaker maker) {
-  int code = guarded(self, VDI_CATALYST_ENGINE, [&] {
-    require(alive() == nullptr, "a run without a script is still active in this process; finalize it first");
-  });
-  if (code != VDI_CATALYST_OK) return code;
   std::optional<vdi::comm::Communicator> comm;
-  code = guardedTogether(self, VDI_CATALYST_ENGINE,
-                         [&] { comm = vdi::comm::Communicator::fromMpi(MPI_Comm_c2f(self.comm)); });
+  int code = guardedTogether(self, VDI_CATALYST_ENGINE,
+                             [&] { comm = vdi::comm::Communicator::fromMpi(MPI_Comm_c2f(self.comm)); });
   if (code != VDI_CATALYST_OK) return code;
   std::optional<Reading> reading;
   code = guarded(self, VDI_CATALYST_ENGINE, [&] { reading.emplace(self, *comm); });
@@ -119,7 +105,7 @@ int initializeAny(int32_t fortran_communicator, const char* json, FrameMaker mak
   if (code != VDI_CATALYST_OK) return code;
   code = start(*self, json, maker);
   if (code == VDI_CATALYST_OK) {
-    *catalyst = alive() = self.release();
+    *catalyst = self.release();
   } else {
     self->engine.reset();
     MPI_Comm_free(&self->comm);
@@ -137,27 +123,24 @@ int makeFramesOfJson(int32_t fortran_communicator, const char* json, int goesOn,
 }
 
 void setClock(vdi_catalyst* catalyst, double seconds) {
-  if (usable(catalyst)) catalyst->engine->setClock(seconds);
+  catalyst->engine->setClock(seconds);
 }
 
 void logLeftOut(vdi_catalyst* catalyst, int64_t step, double time) {
-  if (usable(catalyst)) catalyst->engine->logLeftOut(step, time);
+  catalyst->engine->logLeftOut(step, time);
 }
 
 int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   return vdi::catalyst::setBlocks(*catalyst, count, blocks);
 }
 
 int wants(vdi_catalyst* catalyst, int64_t step, double time) {
-  if (!usable(catalyst)) return 0;
   int wanted = catalyst->engine->wants(step, time) ? 1 : 0;
   MPI_Allreduce(MPI_IN_PLACE, &wanted, 1, MPI_INT, MPI_MAX, catalyst->comm);
   return wanted;
 }
 
 int execute(vdi_catalyst* catalyst, int64_t step, double time) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const auto start = std::chrono::steady_clock::now();
   int code =
       vdi::catalyst::checkStep(*catalyst, step, time, [&] { require(step >= 0, "steps count from 0"); });
@@ -176,15 +159,14 @@ vdi::catalyst::Parameters& parametersOf(vdi_catalyst& catalyst) {
 }
 
 int finalize(vdi_catalyst* catalyst) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
-  const std::unique_ptr<vdi_catalyst> self(std::exchange(alive(), nullptr));
+  const std::unique_ptr<vdi_catalyst> self(catalyst);
   const int code = guardedTogether(*self, VDI_CATALYST_ENGINE, [&] { self->engine->finish(); });
   self->engine.reset();
   MPI_Comm_free(&self->comm);
   return code;
 }
 
-using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable, parametersOf>;
+using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, parametersOf>;
 
 }  // namespace
 

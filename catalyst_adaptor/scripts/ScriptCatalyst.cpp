@@ -47,16 +47,6 @@ using vdi::catalyst::ScriptLog;
 using vdi::catalyst::scriptsOf;
 using Clock = std::chrono::steady_clock;
 
-/// The live handle; a process has one at a time. Any other handle has been finalized, and must not be read.
-vdi_catalyst*& alive() {
-  static vdi_catalyst* handle = nullptr;
-  return handle;
-}
-
-bool usable(const vdi_catalyst* catalyst) {
-  return catalyst != nullptr && catalyst == alive();
-}
-
 /// An engine whose vdi_catalyst_initialize failed after its start, for example because of a script. The next
 /// call takes it, because ParaView starts once in a process. It is never deleted: that needs MPI, which is
 /// gone at the process's end.
@@ -204,7 +194,7 @@ int initializeAny(int32_t fortran_communicator, int32_t script_count, const Give
     return code;
   }
   sayIfNothingIsMade(*self, scripts);
-  *catalyst = alive() = self.release();
+  *catalyst = self.release();
   return VDI_CATALYST_OK;
 }
 
@@ -224,7 +214,6 @@ int makeFramesOfPipelines(int32_t fortran_communicator, int32_t script_count,
 }
 
 int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* blocks) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const PythonLock lock;
   std::unique_ptr<vdi::catalyst::VtkGrid> grid;
   const int code = vdi::catalyst::setBlocks(*catalyst, count, blocks, [&] {
@@ -235,13 +224,11 @@ int setBlocks(vdi_catalyst* catalyst, int32_t count, const vdi_catalyst_block* b
 }
 
 int wants(vdi_catalyst* catalyst, int64_t step, double /*time*/) {
-  if (!usable(catalyst)) return 0;
   const PythonLock lock;
   return isWanted(*catalyst, step) ? 1 : 0;
 }
 
 void setWantedSteps(vdi_catalyst* catalyst, int64_t first, int32_t count, std::uint8_t* wanted) {
-  if (!usable(catalyst)) return;
   const PythonLock lock;
   setWantedSteps(*catalyst, first, {wanted, static_cast<std::size_t>(count)});
 }
@@ -259,7 +246,6 @@ int runScripts(vdi_catalyst& self, int64_t step, double time) {
 }
 
 int execute(vdi_catalyst* catalyst, int64_t step, double time) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const PythonLock lock;
   const auto begin = Clock::now();
   int code = vdi::catalyst::checkStep(*catalyst, step, time, [&] { vdi::catalyst::requireStep(step); });
@@ -273,7 +259,7 @@ int execute(vdi_catalyst* catalyst, int64_t step, double time) {
 }
 
 void logLeftOut(vdi_catalyst* catalyst, int64_t step, double time) {
-  if (!usable(catalyst) || !catalyst->log) return;
+  if (!catalyst->log) return;
   try {
     catalyst->log->addLeftOut(step, time);
   } catch (const std::exception& error) {  // the other ranks don't know of it, and no step fails
@@ -286,9 +272,8 @@ vdi::catalyst::Parameters& parametersOf(vdi_catalyst& catalyst) {
 }
 
 int finalize(vdi_catalyst* catalyst) {
-  if (!usable(catalyst)) return VDI_CATALYST_BAD_ARGUMENT;
   const PythonLock lock;
-  const std::unique_ptr<vdi_catalyst> self(std::exchange(alive(), nullptr));
+  const std::unique_ptr<vdi_catalyst> self(catalyst);
   int code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { return self->engine->finish(); });
   if (self->isLogged) {
     const int logged = guarded(*self, VDI_CATALYST_ENGINE, [&] {
@@ -304,7 +289,7 @@ int finalize(vdi_catalyst* catalyst) {
   return code;
 }
 
-using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, usable, parametersOf, PythonLock>;
+using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, parametersOf, PythonLock>;
 
 }  // namespace
 

@@ -8,11 +8,14 @@
  * VDI_TEST_WANTS: for each step whether it is wanted, such as 1010; others aren't handed over.
  * VDI_TEST_OWN_TIMES=1: each rank gives a step another time. VDI_TEST_PAUSE: milliseconds between steps.
  * VDI_TEST_ALARM=1: SIGALRM interrupts each rank every millisecond, and its handler restarts no call.
+ * VDI_TEST_THREADS=1: within each call of the handle, at each MPI_Allreduce, another thread and then this one
+ * make all calls of the same handle, which must be refused.
  * VDI_TEST_STOP=MILLISECONDS: the last rank is stopped for so long within each step. VDI_TEST_LIMIT: the
  * bytes beyond which no file can grow while the third step is executed. VDI_ISOLATION: frames are made in
  * processes of their own. */
 #include <math.h>
 #include <mpi.h>
+#include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -79,6 +82,45 @@ static pid_t stop_soon(int milliseconds) {
   usleep((useconds_t)milliseconds * 1000);
   kill(getppid(), SIGCONT);
   _exit(0);
+}
+
+static vdi_catalyst* entered; /* the handle in whose calls others intrude; null: they don't */
+static int intrusions;
+static int admissions; /* calls that weren't refused */
+
+static void* intrude(void* unused) {
+  (void)unused;
+  static const vdi_catalyst_block block = {{1, 1, 1}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {1, 1, 1}};
+  static const double offset[3] = {0, 0, 0};
+  static const vdi_catalyst_strides strides = {{8, 8, 8}, 8};
+  static const vdi_catalyst_particles none = {.positions = {offset, offset, offset}};
+  const void* data[] = {cells};
+  const int codes[] = {
+      vdi_catalyst_set_blocks(entered, 1, &block),
+      vdi_catalyst_set_array(entered, "V", VDI_CATALYST_F64, VDI_CATALYST_CELLS, data),
+      vdi_catalyst_set_array_strided(entered, "V", VDI_CATALYST_F64, VDI_CATALYST_CELLS, 1, data, &strides),
+      vdi_catalyst_set_array_offset(entered, "V", VDI_CATALYST_CELLS, offset),
+      vdi_catalyst_set_particles(entered, "P", &none),
+      vdi_catalyst_execute(entered, 0, 0.0),
+      vdi_catalyst_finalize(entered)};
+  for (size_t i = 0; i < sizeof codes / sizeof *codes; ++i) admissions += codes[i] != VDI_CATALYST_BUSY;
+  admissions += vdi_catalyst_wants(entered, 0, 0.0) != 0;
+  admissions += vdi_catalyst_parameter_f64(entered, "feed", 0.25, 0.0, 1.0) != 0.25;
+  admissions += vdi_catalyst_parameter_i64(entered, "count", 4, 0, 9) != 4;
+  admissions += strstr(vdi_catalyst_error(entered), "VDI_CATALYST_BUSY") == NULL;
+  return NULL;
+}
+
+/* The libraries find this function, and not MPI's, because the program exports it. */
+int MPI_Allreduce(const void* from, void* to, int count, MPI_Datatype type, MPI_Op op, MPI_Comm comm) {
+  if (entered != NULL) {
+    pthread_t other;
+    if (pthread_create(&other, NULL, intrude, NULL) != 0) abort();
+    pthread_join(other, NULL);
+    intrude(NULL);
+    ++intrusions;
+  }
+  return PMPI_Allreduce(from, to, count, type, op, comm);
 }
 
 static int refuse(int rank, const char* json, int wanted) {
@@ -173,6 +215,7 @@ int main(int argc, char** argv) {
 
   vdi_catalyst* catalyst = NULL;
   wrong += expect(rank, "initialize", VDI_CATALYST_OK, initialize_any(argv[1], &catalyst));
+  if (getenv("VDI_TEST_THREADS") != NULL) entered = catalyst;
   if (!is_script(argv[1])) wrong += refuse(rank, argv[1], VDI_CATALYST_ENGINE); /* one at a time */
 
   const int first = rank * N / ranks;
@@ -214,7 +257,14 @@ int main(int argc, char** argv) {
       wrong += expect(rank, "the error's text", 1, vdi_catalyst_error(catalyst)[0] != '\0');
   }
   wrong += refuse_steps(rank, ranks, catalyst);
+  const int intruded = intrusions;
   wrong += expect_end(rank, vdi_catalyst_finalize(catalyst));
+  if (entered != NULL) {
+    wrong += expect(rank, "intrusions before finalize", 1, intruded > 20);
+    wrong += expect(rank, "intrusions into finalize", 1, intrusions > intruded);
+    wrong += expect(rank, "admissions", 0, admissions);
+    entered = NULL;
+  }
   const struct itimerval never = {{0, 0}, {0, 0}};
   setitimer(ITIMER_REAL, &never, NULL);
   if (getenv("VDI_TEST_ALARM") != NULL) wrong += expect(rank, "alarms", 1, alarms > 0);

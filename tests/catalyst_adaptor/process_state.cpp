@@ -1,7 +1,8 @@
 // A simulation that has its own settings of the process, and checks after each call of the adaptor
 // that they are unchanged: signals, floating point, locale, environment, folder, umask, limits,
-// streams. Argument: a script that changes all it can, or a JSON text. Exit status 0 if each call
-// succeeded, but for the first one, which is refused, and nothing had changed.
+// streams. Argument: a script that changes all it can, or a JSON text. Beside the script's run, a call of
+// another run begins earlier and ends earlier. Exit status 0 if each call succeeded, but for the first one,
+// which is refused, and nothing had changed.
 #include <dirent.h>
 #include <fcntl.h>
 #include <mpi.h>
@@ -23,12 +24,15 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <future>
 #include <iostream>
 #include <locale>
 #include <map>
 #include <new>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -231,10 +235,46 @@ void compare(const char* call, int code, const State& before, int wanted = VDI_C
   }
 }
 
+/// What happens within this thread's next MPI_Allreduce; empty: nothing.
+thread_local std::function<void()> meanwhile;
+
+/// Two threads ask two runs for a step. The first one begins and returns first.
+void overlap(vdi_catalyst* first, vdi_catalyst* second) {
+  std::promise<void> hasEntered;
+  std::promise<void> hasReturned;
+  std::thread other;
+  meanwhile = [&] {
+    other = std::thread([&] {
+      meanwhile = [&] {
+        hasEntered.set_value();
+        hasReturned.get_future().wait();
+      };
+      vdi_catalyst_wants(second, 1, 1.0);
+      if (std::exchange(meanwhile, nullptr)) hasEntered.set_value();  // the call was refused
+    });
+    hasEntered.get_future().wait();
+  };
+  vdi_catalyst_wants(first, 1, 1.0);
+  hasReturned.set_value();
+  if (other.joinable()) other.join();
+  if (!std::exchange(meanwhile, nullptr)) return;
+  std::fprintf(stderr, "FAILED: the calls didn't overlap\n");
+  ++wrong;
+}
+
 }  // namespace
 
+/// The libraries find this function, and not MPI's, because the program exports it.
+extern "C" __attribute__((visibility("default"))) int MPI_Allreduce(const void* from, void* to, int count,
+                                                                    MPI_Datatype type, MPI_Op op,
+                                                                    MPI_Comm comm) {
+  if (const auto action = std::exchange(meanwhile, nullptr)) action();
+  return PMPI_Allreduce(from, to, count, type, op, comm);
+}
+
 int main(int argc, char** argv) {
-  MPI_Init(&argc, &argv);
+  int level = 0;
+  MPI_Init_thread(&argc, &argv, MPI_THREAD_SERIALIZED, &level);
   if (argc < 2) MPI_Abort(MPI_COMM_WORLD, 2);
   const std::string what = argv[1];
   const bool isScript = what.ends_with(".py");
@@ -278,6 +318,12 @@ int main(int argc, char** argv) {
     const bool isWanted = vdi_catalyst_wants(catalyst, step, step) != 0;
     compare("wants", isWanted ? VDI_CATALYST_OK : VDI_CATALYST_ENGINE, before);
     compare("execute", vdi_catalyst_execute(catalyst, step, step), before);
+  }
+  if (isScript && std::getenv("VDI_ISOLATION") == nullptr) {
+    vdi_catalyst* beside = nullptr;
+    compare("a second run", vdi_catalyst_initialize_json(comm, R"({"field": "V"})", &beside), before);
+    overlap(beside, catalyst);
+    compare("calls that overlap", vdi_catalyst_finalize(beside), before);
   }
   compare("finalize", vdi_catalyst_finalize(catalyst), before);
   // A script in a separate process sends the signals to that process.
