@@ -23,7 +23,8 @@ extern "C" {
  * whose files stay. `set_clock`, which may be null, sets the time, in seconds since the run's start, that
  * counts for the next step. `log_left_out`, which may be null, notes in the log, on the first rank, that the
  * simulation didn't hand over a step, because two earlier frames were still to be made. Neither is
- * collective. `wanted_steps`, which only the engine for scripts has, sets wanted[i] to what `wants` returns
+ * collective. `refuse` and `end_run`, which only the engine for scripts has, are the functions below.
+ * `wanted_steps`, which only the engine for scripts has, sets wanted[i] to what `wants` returns
  * for the step first + i at any time, for i from 0 to count - 1, in one reduction. */
 typedef struct vdi_catalyst_functions {
   int (*initialize)(int32_t, int32_t, const char* const*, vdi_catalyst**);
@@ -42,7 +43,9 @@ typedef struct vdi_catalyst_functions {
   int (*execute)(vdi_catalyst*, int64_t, double);
   double (*parameter_f64)(vdi_catalyst*, const char*, double, double, double);
   int64_t (*parameter_i64)(vdi_catalyst*, const char*, int64_t, int64_t, int64_t);
+  int (*refuse)(vdi_catalyst*, const char*);
   int (*finalize)(vdi_catalyst*);
+  int (*end_run)(vdi_catalyst*);
   const char* (*error)(const vdi_catalyst*);
   void (*set_clock)(vdi_catalyst*, double);
   void (*log_left_out)(vdi_catalyst*, int64_t, double);
@@ -65,6 +68,13 @@ VDI_CATALYST_API void vdi_catalyst_wanted_steps(vdi_catalyst* catalyst, int64_t 
                                                 uint8_t* wanted);
 VDI_CATALYST_API void vdi_catalyst_set_clock(vdi_catalyst* catalyst, double seconds);
 VDI_CATALYST_API void vdi_catalyst_log_left_out(vdi_catalyst* catalyst, int64_t step, double time);
+
+/* And these for the module pv_vdi.catalyst. A rank that can't make a call of blocks, arrays or particles that
+ * the others make calls vdi_catalyst_refuse in its place: all ranks get VDI_CATALYST_BAD_ARGUMENT and the
+ * reason. vdi_catalyst_end_run is vdi_catalyst_finalize, except that ParaView stays for another run of
+ * scripts on the same ranks. */
+VDI_CATALYST_API int vdi_catalyst_refuse(vdi_catalyst* catalyst, const char* reason);
+VDI_CATALYST_API int vdi_catalyst_end_run(vdi_catalyst* catalyst);
 
 #ifdef __cplusplus
 }

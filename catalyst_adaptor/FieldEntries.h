@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "catalyst_adaptor/EngineFunctions.h"
 #include "catalyst_adaptor/FieldCalls.h"
@@ -43,6 +44,9 @@ struct FieldEntries {
                                    std::int64_t high) {
     return inForce(*handle, parametersOf(*handle), name, value, low, high);
   }
+  static int refuse(Handle* handle, const char* reason) {
+    return conclude(*handle, VDI_CATALYST_BAD_ARGUMENT, reason, std::nullopt);
+  }
   static const char* error(const Handle* handle) {
     return handle != nullptr ? handle->error.c_str() : lastError();
   }
@@ -56,6 +60,7 @@ struct FieldEntries {
     table.set_particles = setParticles;
     table.parameter_f64 = parameterF64;
     table.parameter_i64 = parameterI64;
+    table.refuse = refuse;
     table.error = error;
     return table;
   }

@@ -427,7 +427,12 @@ int64_t vdi_catalyst_parameter_i64(vdi_catalyst* catalyst, const char* name, int
   RETURN_CALL(int64_t, value, parameter_i64(catalyst, name, value, low, high));
 }
 
-int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
+int vdi_catalyst_refuse(vdi_catalyst* catalyst, const char* reason) {
+  RETURN_CALL(int, refusal, refuse(catalyst, reason));
+}
+
+/* `keeps_engine`: the engine stays for another run, if it can. */
+static int finalize(vdi_catalyst* catalyst, int keeps_engine) {
   if (catalyst != NULL && is_forked()) return VDI_CATALYST_OK; /* the run ends in the process that began it */
   int over = 0;
   MPI_Finalized(&over);
@@ -436,14 +441,24 @@ int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
   int refusal;
   vdi_run* const run = enter(catalyst, &refusal);
   if (run == NULL) return refusal;
+  const vdi_catalyst_functions* const engine = run->engine->functions;
   vdi_process_state state;
   vdi_process_state_save(&state);
-  const int code = run->engine->functions->finalize(catalyst);
-  if (code != VDI_CATALYST_OK) keep_text(WITHOUT_HANDLE, run->engine->functions->error(NULL));
+  const int code =
+      keeps_engine && engine->end_run != NULL ? engine->end_run(catalyst) : engine->finalize(catalyst);
+  if (code != VDI_CATALYST_OK) keep_text(WITHOUT_HANDLE, engine->error(NULL));
   run->handle = NULL;
   vdi_process_state_restore(&state);
   leave(run);
   return code;
+}
+
+int vdi_catalyst_finalize(vdi_catalyst* catalyst) {
+  return finalize(catalyst, 0);
+}
+
+int vdi_catalyst_end_run(vdi_catalyst* catalyst) {
+  return finalize(catalyst, 1);
 }
 
 const char* vdi_catalyst_error(const vdi_catalyst* catalyst) {

@@ -128,7 +128,11 @@ class Pipeline : public vtkInSituPipeline {
   /// Whether the last step failed.
   bool failed() const { return failed_; }
 
+  /// Makes it do nothing from now on: ParaView keeps all pipelines that it has been given.
+  void end() { hasEnded_ = true; }
+
   bool Execute(int step, double time) override {
+    if (hasEnded_) return true;
     if (!python_) {
       vtkNew<vtkInSituPipelinePython> python;
       python->SetFileName(script_.file.c_str());
@@ -147,6 +151,7 @@ class Pipeline : public vtkInSituPipeline {
  private:
   Script script_;
   bool failed_ = false;
+  bool hasEnded_ = false;
   vtkSmartPointer<vtkInSituPipelinePython> python_;
 };
 
@@ -213,13 +218,17 @@ class Guard {
   }
 
   /// Call it after all scripts of a step.
-  void endStep() {
+  void endStep() { call("end_step"); }
+  /// Removes all loaded scripts and what they have made.
+  void forgetScripts() { call("forget_scripts"); }
+
+ private:
+  void call(const char* function) {
     const vtkPythonScopeGilEnsurer lock;
-    const vtkSmartPyObject result(PyObject_CallMethod(module_, "end_step", nullptr));
+    const vtkSmartPyObject result(PyObject_CallMethod(module_, function, nullptr));
     if (!result) PyErr_Clear();
   }
 
- private:
   static std::string textOr(const std::string& fallback, PyObject* result) {
     const char* text = result != nullptr ? PyUnicode_AsUTF8(result) : nullptr;
     if (text != nullptr) return text;
@@ -518,6 +527,13 @@ std::optional<std::string> Engine::finish() {
   for (const auto& pipeline : state_->pipelines) good = pipeline->Finalize() && good;
   state_->agreement->leaveStep();
   return state_->result(good);
+}
+
+void Engine::forgetScripts() {
+  for (const auto& pipeline : state_->pipelines) pipeline->end();
+  state_->pipelines.clear();
+  state_->guard->forgetScripts();
+  state_->parameters = {};
 }
 
 std::optional<std::string> Engine::execute(vtkDataObject* grid, int step, double time) {

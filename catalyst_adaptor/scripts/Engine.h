@@ -70,8 +70,11 @@ class Engine {
   /// Not collective. Throws std::bad_alloc if there was no memory for one.
   std::vector<MadeFrame> takeFrames();
 
-  /// Runs the scripts' catalyst_finalize. Only the destructor may follow. Returns as `execute` does.
+  /// Runs the scripts' catalyst_finalize. Only `forgetScripts` or the destructor may follow. Returns as
+  /// `execute` does.
   std::optional<std::string> finish();
+  /// Removes the scripts with all that they have made, and the parameters, so that another run can begin.
+  void forgetScripts();
 
  private:
   struct State;

@@ -47,9 +47,9 @@ using vdi::catalyst::ScriptLog;
 using vdi::catalyst::scriptsOf;
 using Clock = std::chrono::steady_clock;
 
-/// An engine whose vdi_catalyst_initialize failed after its start, for example because of a script. The next
-/// call takes it, because ParaView starts once in a process. It is never deleted: that needs MPI, which is
-/// gone at the process's end.
+/// An engine without a run: its vdi_catalyst_initialize failed after its start, for example because of a
+/// script, or vdi_catalyst_end_run has kept it. The next initialising takes it, because ParaView starts once
+/// in a process. It is never deleted: that needs MPI, which is gone at the process's end.
 vdi::catalyst::Engine*& spareEngine() {
   static vdi::catalyst::Engine* engine = nullptr;
   return engine;
@@ -271,7 +271,9 @@ vdi::catalyst::Parameters& parametersOf(vdi_catalyst& catalyst) {
   return catalyst.engine->parameters();
 }
 
-int finalize(vdi_catalyst* catalyst) {
+enum class ParaViewAfterwards { Ends, Stays };
+
+int end(vdi_catalyst* catalyst, ParaViewAfterwards paraView) {
   const PythonLock lock;
   const std::unique_ptr<vdi_catalyst> self(catalyst);
   int code = guarded(*self, VDI_CATALYST_SCRIPT, [&] { return self->engine->finish(); });
@@ -283,10 +285,25 @@ int finalize(vdi_catalyst* catalyst) {
   }
   self->grid.reset();
   self->deposits.reset();
-  const int ended = guarded(*self, VDI_CATALYST_ENGINE, [&] { self->engine.reset(); });
+  const int ended = guarded(*self, VDI_CATALYST_ENGINE, [&] {
+    if (paraView == ParaViewAfterwards::Ends) {
+      self->engine.reset();
+    } else {
+      self->engine->forgetScripts();
+    }
+  });
+  if (self->engine) spareEngine() = self->engine.release();
   if (code == VDI_CATALYST_OK) code = ended;
   MPI_Comm_free(&self->comm);
   return code;
+}
+
+int finalize(vdi_catalyst* catalyst) {
+  return end(catalyst, ParaViewAfterwards::Ends);
+}
+
+int endRun(vdi_catalyst* catalyst) {
+  return end(catalyst, ParaViewAfterwards::Stays);
 }
 
 using Entries = vdi::catalyst::FieldEntries<vdi_catalyst, parametersOf, PythonLock>;
@@ -303,6 +320,7 @@ constinit const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS = [] {
   table.wanted_steps = setWantedSteps;
   table.execute = execute;
   table.finalize = finalize;
+  table.end_run = endRun;
   table.log_left_out = logLeftOut;
   return table;
 }();

@@ -143,7 +143,6 @@ def install(leave, plugin):
 
     sys.excepthook = hook
     skip = (__name__, "<string>", engine.__file__, "<frozen importlib", importlib.__file__)
-    loading = Loading()
     extracts = Extracts(loading, leave)
 
     def guard(name, **hooks):
@@ -194,13 +193,16 @@ class Loading:
     """The script that is being loaded, and what the loaded ones have made."""
 
     def __init__(self):
-        self.proxies = None  # the proxies that existed before this script was loaded
+        self.first_proxies = None  # the proxies that existed before any script was loaded
+        self.proxies = None  # those that existed before this one was loaded
         self.folders = {}  # folders of extracts, by module's name
         self.owners = {}  # modules' names, by extractor
 
     def start(self):
         extend_proxies()
         self.proxies = registered_proxies()
+        if self.first_proxies is None:
+            self.first_proxies = self.proxies
 
     def note(self, module):
         modules.append(module)
@@ -211,14 +213,32 @@ class Loading:
                                                        module.options.ExtractsOutputDirectory)
 
     def forget(self, name):
+        self.forget_module(name)
+        forget_new_proxies(self.proxies)
+
+    def forget_all(self):
+        for module in list(modules):
+            self.forget_module(module.__name__)
+        forget_new_proxies(self.first_proxies)
+        self.__init__()
+
+    @staticmethod
+    def forget_module(name):
         from paraview.catalyst import importers
         importers._path_finder_instance._registered_files.pop(name, None)
         sys.modules.pop(name, None)
         modules[:] = [module for module in modules if module.__name__ != name]
-        forget_new_proxies(self.proxies)
 
     def folder_of(self, extractor):
         return self.folders.get(self.owners.get(extractor.SMProxy, ""), "")
+
+
+loading = Loading()
+
+
+def forget_scripts():
+    """Removes the modules of all scripts and the proxies that they have made."""
+    loading.forget_all()
 
 
 class Missed:
