@@ -4,13 +4,14 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 import weakref
 
 import numpy as np
 from mpi4py import MPI
 
 import pv_vdi
-from pv_vdi.catalyst import BAD_ARGUMENT, ENGINE, SCRIPT, Block, Catalyst, CatalystError
+from pv_vdi.catalyst import BAD_ARGUMENT, BUSY, SCRIPT, Block, Catalyst, CatalystError
 
 N = 16
 FOLDER = os.environ["VDI_OUTPUT"]
@@ -19,26 +20,153 @@ os.makedirs(FOLDER)
 os.chdir(FOLDER)
 
 
-def refused(code, **what):
+def refused(code, words, **what):
     try:
         Catalyst(MPI.COMM_WORLD, **what)
     except CatalystError as error:
-        assert error.code == code, error.code
+        assert error.code == code and words in str(error), (error.code, error)
         return
     raise AssertionError("it's taken: %s" % what)
 
 
-def refused_particles(catalyst):
-    """Particles whose shapes or types don't fit."""
-    good = np.zeros((5, 3))
-    for arguments in [(np.zeros((5, 2)),), (np.zeros(15),), (np.zeros((5, 3), np.int32),), ((good[:, 0], good[:, 1]),),
-                      ((good[:, 0], good[:, 1], good[:4, 2]),), ((good[:, 0], good[:, 1], np.zeros(5)),),
-                      (good, np.zeros(4)), (good, np.zeros(5, np.int64)), (good, None, np.zeros((5, 1)))]:
+def check_faults(catalyst):
+    """What doesn't fit is refused by a text that says what to write."""
+    good = np.zeros((N, N, N))
+    particles = np.zeros((5, 3))
+    x, y, z = particles.T
+
+    def array(values, **options):
+        return lambda: catalyst.set_array("V", values, **options)
+
+    def block(**fields):
+        return lambda: catalyst.set_blocks([Block(**{"cells": (N, N, N), **fields})])
+
+    def deposit(*arguments):
+        return lambda: catalyst.set_particles("density", *arguments)
+
+    for call, words in [
+            (array([good.tolist()]), "numpy.asarray(values)"),
+            (array(good), "a list with one array for each block, [values]"),
+            (array(5), "a list with one array for each block, [values]"),
+            (array([good, good]), "2 arrays of 'V' for 1 blocks"),
+            (array([good.astype(">f4")]), "values.astype('float32')"),
+            (array([good.astype(">i2")]), "values.astype('int16')"),
+            (array([good.astype(">c16")]), "values.astype('complex128')"),
+            (array([good.astype("float16")]), "values.astype('float32')"),
+            (array([good.astype("longdouble")]), "values.astype('float64')"),
+            (array([good.astype(object)]), "values.astype('float64')"),
+            (array([good > 0]), "values.view('uint8')"),
+            (array([good.astype("datetime64[s]")]), "must be one of uint8, "),
+            (array([np.zeros((N + 1,) * 3)]), "write points=True"),
+            (array([good], points=True), "write points=False"),
+            (array([good.ravel()]), "values.reshape(16, 16, 16)"),
+            (array([np.zeros((3, N, N, N))]), "numpy.moveaxis(values, 0, -1)"),
+            (array([np.zeros((N, N, N, 2), complex)]), "values[..., 0]"),
+            (array([good], offset=0.5), "(-0.5, 0, 0)"),
+            (lambda: catalyst.set_array(b"V", [good]), "write a text"),
+            (block(cells=(16.0, N, N)), "(64, 64, 64); int() makes whole numbers"),
+            (block(cells=N), "write x, y and z"),
+            (block(ghost_lo=(0.5, 0, 0)), "ghost_lo of block 0"),
+            (block(spacing="wide"), "(0.1, 0.1, 0.1)"),
+            (lambda: catalyst.set_blocks([(N, N, N)]), "write Block("),
+            (lambda: catalyst.execute(0.5), "int(step)"),
+            (deposit(np.zeros((5, 2))), "[particle][3]"),
+            (deposit(np.zeros((3, 5))), "positions.T"),
+            (deposit(np.zeros(15)), "[particle][3]"),
+            (deposit(np.zeros((5, 3), np.int32)), "positions.astype('float64')"),
+            (deposit(particles.astype(">f8")), "positions.astype('float64')"),
+            (deposit((x, y)), "three of x, y and z"),
+            (deposit((x, y, z[:4])), "type, length or stride"),
+            (deposit((x, y, np.zeros(5))), "type, length or stride"),
+            (deposit(particles, np.zeros(4)), "for 5 particles"),
+            (deposit(particles, np.zeros(5, np.int64)), "weights.astype('float64')"),
+            (deposit(particles, None, np.zeros((5, 1))), "for 5 particles"),
+            (lambda: Catalyst(MPI.COMM_WORLD), "either scripts="),
+            (lambda: Catalyst(MPI.COMM_WORLD, "minimal.py"), "['minimal.py']"),
+            (lambda: Catalyst(5, json={"field": "V"}), "MPI.COMM_WORLD")]:
         try:
-            catalyst.set_particles("density", *arguments)
-        except ValueError:
+            call()
+        except ValueError as error:
+            assert words in str(error), (words, error)
             continue
-        raise AssertionError("they're taken: %s" % (arguments,))
+        raise AssertionError("it's taken: %s" % words)
+    catalyst.set_array("V", [np.asfortranarray(good)])  # in place, with NumPy's own numbers
+    catalyst.set_blocks([Block(cells=np.array([N, N, N]), spacing=np.float32([1, 1, 1]))])
+
+
+def check_lost():
+    """A run that is lost or goes on ends when the next one begins, which works; a failed cell of a notebook keeps the run's
+    variable in its traceback."""
+    run = {"field": "V", "resolution": [40, 30], "output": "lost_{timestep}.vdi", "existing": "overwrite"}
+
+    def cell(step, fails):
+        catalyst = Catalyst(MPI.COMM_WORLD, json=run)
+        catalyst.set_blocks([Block(cells=(N, N, N))])
+        catalyst.set_array("V", [np.random.default_rng(1).random((N, N, N))])
+        catalyst.execute(np.int64(step))
+        assert not fails, "the cell fails"
+        return catalyst
+
+    before = cell(0, False)
+    kept = None
+    try:
+        cell(1, True)
+    except AssertionError as error:
+        kept = error
+    assert kept is not None and "the cell fails" in str(kept)
+    try:
+        before.execute(5)
+    except CatalystError as error:
+        assert error.code == BAD_ARGUMENT and "has ended" in str(error), error
+    else:
+        raise AssertionError("a run that has ended goes on")
+    before.close()  # ends nothing
+    try:
+        with cell(2, False) as catalyst:
+            catalyst.set_array("W", [])
+    except ValueError:
+        pass
+    cell(3, False)  # lost at once
+    cell(4, False).close()
+    assert all(os.path.exists("lost_%d.vdi" % step) for step in range(5))
+
+
+def check_threads():
+    """While one thread is in a call, the calls of another one are refused, and lose nothing."""
+    run = {"field": "V", "resolution": [160, 120], "output": "threads_{timestep}.vdi"}
+    with Catalyst(MPI.COMM_WORLD, json=run) as catalyst:
+        catalyst.set_blocks([Block(cells=(N, N, N))])
+        values = np.random.default_rng(1).random((N, N, N))
+        catalyst.set_array("V", [values])
+        refusals = {"set_array": 0, "execute": 0, "wants": 0}
+        is_over = threading.Event()
+        others = []
+
+        def intrude():
+            while not is_over.is_set():
+                for name, call in [("set_array", lambda: catalyst.set_array("V", [values])),
+                                   ("wants", lambda: catalyst.wants(0)), ("execute", lambda: catalyst.execute(-1))]:
+                    try:
+                        call()
+                    except CatalystError as error:
+                        if error.code == BUSY:
+                            refusals[name] += 1
+                        elif not (name == "execute" and error.code == BAD_ARGUMENT):
+                            others.append(error)
+
+        thread = threading.Thread(target=intrude)
+        thread.start()
+        made = 0
+        while made < 3:
+            try:
+                catalyst.execute(made)
+                made += 1
+            except CatalystError as error:
+                assert error.code == BUSY, error
+        is_over.set()
+        thread.join()
+        assert not others and all(refusals.values()), (others, refusals)
+    assert all(os.path.exists("threads_%d.vdi" % step) for step in range(3))
 
 
 def shown(positions, weights, lengths, density):
@@ -58,7 +186,7 @@ def end_in_a_child(catalyst):
     if child == 0:
         code = 1
         try:
-            refused(BAD_ARGUMENT, json={"field": "V"})
+            refused(BAD_ARGUMENT, "forked", json={"field": "V"})
             try:
                 catalyst.execute(20, 2.0)
             except CatalystError as error:
@@ -102,8 +230,8 @@ def check_levels():
     assert len(distances) == 1, distances
 
 
-refused(SCRIPT, json={"field": "V", "evry": 10})
-refused(SCRIPT, json="none.json")
+refused(SCRIPT, "no such field", json={"field": "V", "evry": 10})
+refused(SCRIPT, "none.json", json="none.json")
 run = {"field": "V", "every": 10, "resolution": [48, 32], "stream": {"link_file": "link"},
        "output": {"vdi": "v_{timestep:03d}.vdi", "png": "v_{timestep:03d}.png"}}
 x = (np.arange(N) + 0.5) / N
@@ -117,8 +245,7 @@ with Catalyst(MPI.COMM_WORLD, json=run) as catalyst:
         values[...] = np.sin(5 * x)[:, None, None] * np.cos(4 * x)[None, :, None] * (x + 0.01 * step)
         assert catalyst.wants(step) == (step % 10 == 0), step
         catalyst.execute(step, 0.1 * step)
-    refused(ENGINE, json=run)
-    refused_particles(catalyst)
+    check_faults(catalyst)
     end_in_a_child(catalyst)
     link = open("link").read().strip()
     assert os.stat("link").st_mode & 0o777 == 0o600
@@ -141,6 +268,8 @@ with Catalyst(MPI.COMM_WORLD, json={"field": "V"}) as catalyst:
     assert catalyst.wants(1)
 check_kept()
 check_levels()
+check_lost()
+check_threads()
 
 # Particles: one array or three, of any stride, weights and lengths for each or for all.
 places = np.random.default_rng(3).uniform(0.2, 0.8, (2000, 3))

@@ -19,24 +19,28 @@ import ctypes
 import dataclasses
 import json as json_module
 import os
+import sys
 
 import numpy as np
 
+from . import _faults
 from ._location import LIBRARY
 
 __all__ = ["Block", "Catalyst", "CatalystError"]
 
-BAD_ARGUMENT, ENGINE, SCRIPT = 1, 2, 3  # CatalystError.code
+BAD_ARGUMENT, ENGINE, SCRIPT, BUSY = 1, 2, 3, 4  # CatalystError.code
 
 _TYPES = {np.dtype(name): number
           for number, name in enumerate(["uint8", "int8", "uint16", "int16", "uint32", "int32", "float32", "float64", "int64",
                                          "uint64"])}
+_COMPLEX = [np.dtype("complex64"), np.dtype("complex128")]
 _POINTS, _CELLS = 0, 1
 _SUM, _DENSITY = 0, 1
 
 
 class CatalystError(RuntimeError):
-    """A call that failed, on all ranks. `code` is BAD_ARGUMENT, ENGINE or SCRIPT. The next step works again."""
+    """A call that failed, on all ranks, with the reason of the first rank that has one. `code` is BAD_ARGUMENT, ENGINE or
+    SCRIPT. The next step works again. BUSY isn't collective: another thread of this rank is in a call."""
 
     def __init__(self, code, message):
         super().__init__(message)
@@ -54,6 +58,24 @@ class Block:
     spacing: tuple = (1.0, 1.0, 1.0)
     ghost_lo: tuple = (0, 0, 0)
     ghost_hi: tuple = (0, 0, 0)
+
+
+def _made(i, block):
+    """The block as the engine takes it. Raises ValueError."""
+    def whole(field):
+        return _faults.whole_triple("%s of block %d" % (field, i), getattr(block, field), _EXAMPLES[field])
+
+    def real(field):
+        return _faults.triple("%s of block %d" % (field, i), getattr(block, field), float, _EXAMPLES[field])
+
+    missing = [field for field in _EXAMPLES if not hasattr(block, field)]
+    if missing:
+        raise ValueError("block %d is %r; write Block(cells=(64, 64, 64), origin=(0, 0, 0), spacing=(1, 1, 1))" % (i, block))
+    return _Block(whole("cells"), whole("ghost_lo"), whole("ghost_hi"), real("origin"), real("spacing"))
+
+
+_EXAMPLES = {"cells": "(64, 64, 64)", "ghost_lo": "(1, 0, 0)", "ghost_hi": "(0, 0, 1)", "origin": "(0.0, 0.0, 0.0)",
+             "spacing": "(0.1, 0.1, 0.1)"}
 
 
 class _Block(ctypes.Structure):
@@ -77,7 +99,8 @@ def _columns(positions):
     """The columns x, y and z, which share type and stride."""
     if isinstance(positions, np.ndarray):
         if positions.ndim != 2 or positions.shape[1] != 3:
-            raise ValueError("positions are %s, not [particle][3]" % (positions.shape,))
+            raise ValueError("positions are %s, not [particle][3]%s" % (
+                positions.shape, "; write positions.T" if positions.ndim == 2 and len(positions) == 3 else ""))
         columns = [positions[:, axis] for axis in range(3)]
     else:
         columns = [np.asarray(column) for column in positions]
@@ -100,7 +123,8 @@ def _numbers(what, given, count):
 
 def _float_type(what, dtype):
     if dtype not in (np.dtype("float32"), np.dtype("float64")):
-        raise ValueError("%s are %s; they must be float32 or float64" % (what, dtype))
+        raise ValueError("%s are %s, and must be float32 or float64; write %s.astype('float64'): that is a copy, so set it "
+                         "again when the values change" % (what, dtype, what))
     return _TYPES[dtype]
 
 
@@ -138,7 +162,8 @@ def _load():
     library.vdi_catalyst_parameter_f64.restype = ctypes.c_double
     library.vdi_catalyst_parameter_i64.argtypes = [handle, text, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64]
     library.vdi_catalyst_parameter_i64.restype = ctypes.c_int64
-    library.vdi_catalyst_finalize.argtypes = [handle]
+    library.vdi_catalyst_refuse.argtypes = [handle, text]
+    library.vdi_catalyst_end_run.argtypes = [handle]
     library.vdi_catalyst_error.argtypes = [handle]
     library.vdi_catalyst_error.restype = text
     return library
@@ -152,48 +177,96 @@ def _as_pairs(array):
     return np.lib.stride_tricks.as_strided(part, array.shape + (2,), array.strides + (part.dtype.itemsize,), writeable=False)
 
 
-@contextlib.contextmanager
-def _or_refused(call, *arguments):
-    """If the block raises, makes the call with arguments that fail on all ranks, because other ranks wait in it."""
-    try:
-        yield
-    except Exception:
-        call(*arguments)
-        raise
+class _Run:
+    """A handle, which outlives the Catalyst object that is lost without an end. Only calls of all ranks can end a run, and
+    Python collects objects at a time of its own on each rank. So the next run ends it."""
+
+    live = {}  # by kind: scripts, json
+
+    def __init__(self, library, kind, communicator):
+        self.library = library
+        self.kind = kind
+        self.group = communicator.Get_group()
+        self.process = os.getpid()
+        self.handle = ctypes.c_void_p()
+
+    def end(self):
+        """Returns the code; BUSY if another thread is in a call, and then the run goes on."""
+        if not self.handle:
+            return 0
+        code = self.library.vdi_catalyst_end_run(self.handle)
+        if code != BUSY:
+            self.handle = ctypes.c_void_p()
+            if _Run.live.get(self.kind) is self:
+                del _Run.live[self.kind]
+        return code
+
+    def make_way(self, communicator):
+        """Collective: ends the run if a new one of its kind begins on the same ranks."""
+        from mpi4py import MPI
+        group = communicator.Get_group()
+        if MPI.Group.Compare(self.group, group) == MPI.UNEQUAL or self.process != os.getpid():
+            return
+        if communicator.Get_rank() == 0:
+            sys.stderr.write("vdi_catalyst: a new run ends the earlier one, which wasn't closed\n")
+        if self.end() == BUSY:
+            raise CatalystError(BUSY, "the earlier run can't end, because another thread is in one of its calls")
+
+
+def _text_of_json(json):
+    """The JSON text, or the name of a file, of what the user gives. Raises ValueError or TypeError."""
+    if not isinstance(json, dict):
+        return os.fspath(json)
+    return json_module.dumps(json, default=lambda given: given.tolist())  # NumPy's numbers and arrays
 
 
 class Catalyst:
-    """The engine, driven by scripts or by `json`. A process can make one with scripts in all, and one at a time with json.
-    close() or the end of its `with` ends it."""
+    """The engine, driven by scripts or by `json`. A process can have one run with scripts at a time, and one with json.
+    close() or the end of its `with` ends it. A run that was lost, or that goes on in a variable, ends when the next one of its
+    kind begins on the same ranks."""
 
     def __init__(self, communicator, scripts=None, json=None):
         """`communicator`: mpi4py's, or None for a simulation without MPI. Either `scripts`, paths of Catalyst scripts, or
         `json`, a dict, a JSON text or a file's name: what docs/vdi-run.schema.json describes."""
         if (scripts is None) == (json is None):
-            raise ValueError("either scripts or json")
+            raise ValueError("write either scripts=[\"minimal.py\"] or json={\"field\": \"V\"}")
+        if isinstance(scripts, (str, bytes, os.PathLike)):
+            raise ValueError("scripts is %r; write a list, [%r]" % (scripts, os.fspath(scripts)))
         if communicator is None:
             from mpi4py import MPI  # the engine needs MPI in any case
             communicator = MPI.COMM_SELF
+        if not hasattr(communicator, "py2f"):
+            raise ValueError("the communicator is of type %s; write mpi4py's, such as MPI.COMM_WORLD, or None for one process" %
+                             type(communicator).__name__)
+        kind = "scripts" if json is None else "json"
+        # Before any collective call, because other ranks would wait for one that raises.
+        text = None if json is None else os.fsencode(_text_of_json(json))
+        paths = [] if scripts is None else [os.fsencode(script) for script in scripts]
         self._library = _load()
-        self._handle = ctypes.c_void_p()
         self._blocks = []
         self._kept = {}  # arrays that the engine points to, by association and name
+        self._shared_error = None  # the last one, which all ranks have raised
+        self._is_alone = communicator.Get_size() == 1
+        self._run = _Run(self._library, kind, communicator)
+        if kind in _Run.live:
+            _Run.live[kind].make_way(communicator)
+        handle = ctypes.byref(self._run.handle)
         if json is not None:
-            text = json_module.dumps(json) if isinstance(json, dict) else json
-            self._check(self._library.vdi_catalyst_initialize_json(
-                communicator.py2f(), os.fsencode(text), ctypes.byref(self._handle)))
-            return
-        paths = [os.fsencode(script) for script in scripts]
-        self._check(self._library.vdi_catalyst_initialize(
-            communicator.py2f(), len(paths), (ctypes.c_char_p * len(paths))(*paths), ctypes.byref(self._handle)))
+            self._check(self._library.vdi_catalyst_initialize_json(communicator.py2f(), text, handle))
+        else:
+            self._check(self._library.vdi_catalyst_initialize(
+                communicator.py2f(), len(paths), (ctypes.c_char_p * len(paths))(*paths), handle))
+        _Run.live[kind] = self._run
+
+    @property
+    def _handle(self):
+        return self._run.handle
 
     def set_blocks(self, blocks):
         """Sets this rank's blocks, of which there may be none; forgets all arrays."""
-        with _or_refused(self._library.vdi_catalyst_set_blocks, self._handle, -1, None):
+        with self._or_refused():
             blocks = list(blocks)
-            made = (_Block * max(len(blocks), 1))(
-                *(_Block(tuple(b.cells), tuple(b.ghost_lo), tuple(b.ghost_hi), tuple(b.origin), tuple(b.spacing))
-                  for b in blocks))
+            made = (_Block * max(len(blocks), 1))(*(_made(i, block) for i, block in enumerate(blocks)))
         self._check(self._library.vdi_catalyst_set_blocks(self._handle, len(blocks), made))
         self._blocks = blocks
         self._kept = {}
@@ -205,41 +278,44 @@ class Catalyst:
         `offset` cells (x, y, z; -0.5 to 0.5) beside these.
 
         Arrays are kept alive: change them in place between steps, or set others. They are used in place, whatever their
-        strides: slices, transposed arrays, one field of several. Raises ValueError for a shape that the block doesn't have and
-        for a type that the engine doesn't know; ranks without such a fault raise CatalystError then."""
+        strides: slices, transposed arrays, one field of several. Raises ValueError, which says what to write, for a shape that
+        the block doesn't have and for a type that the engine doesn't know; ranks without such a fault raise CatalystError with
+        the same reason."""
         association = _POINTS if points else _CELLS
-        with _or_refused(self._library.vdi_catalyst_set_array_strided, self._handle, b"refused", -1, association, 1, None,
-                         (_Strides * 1)()):
-            arrays = list(arrays)
+        with self._or_refused():
+            key = _faults.name_bytes(name)
+            arrays = _faults.one_per_block(name, arrays, len(self._blocks))
             number, components, pointers, strides = self._given(name, arrays, points)
-            offsets = None if offset is None else (ctypes.c_double * 3)(*offset)
+            offsets = None if offset is None else (ctypes.c_double * 3)(
+                *_faults.triple("the offset of '%s'" % name, offset, float, "(-0.5, 0, 0), in cells"))
         self._check(self._library.vdi_catalyst_set_array_strided(
-            self._handle, name.encode(), number, association, components, pointers, strides))
+            self._handle, key, number, association, components, pointers, strides))
         self._kept[association, name] = arrays
         if offsets is not None:
-            self._check(self._library.vdi_catalyst_set_array_offset(self._handle, name.encode(), association, offsets))
+            self._check(self._library.vdi_catalyst_set_array_offset(self._handle, key, association, offsets))
 
     def _given(self, name, arrays, points):
         """The type, the number of components, the pointers and the strides of one array for each block. Raises ValueError."""
-        if len(arrays) != len(self._blocks):
-            raise ValueError("%d arrays for %d blocks" % (len(arrays), len(self._blocks)))
+        for i, array in enumerate(arrays):
+            if array is not None:
+                _faults.require_array("the array of '%s' for block %d" % (name, i), array)
+        _faults.require_types(name, {array.dtype for array in arrays if array is not None}, [*_TYPES, *_COMPLEX])
+        for array, block in zip(arrays, self._blocks):
+            if array is not None:
+                _faults.require_shape(name, array.shape, block.cells, points)
+                _faults.require_one_component(name, array)
         # A view of complex numbers as pairs is no copy, and follows the values when these change.
         views = [_as_pairs(array) for array in arrays]
         present = [view for view in views if view is not None]
-        types = {view.dtype for view in present} or {np.dtype("float64")}
-        if len(types) > 1 or not types <= set(_TYPES):
-            raise ValueError("the values of '%s' are %s; all must be of one of %s" % (
-                name, " and ".join(sorted(map(str, types))), ", ".join(map(str, _TYPES))))
         components = {view.shape[3] if view.ndim == 4 else 1 for view in present} or {1}
-        for view, block in zip(views, self._blocks):
-            shape = tuple(count + bool(points) for count in reversed(block.cells))
-            if view is not None and (view.shape[:3] != shape or view.ndim > 4 or len(components) > 1):
-                raise ValueError("an array of '%s' is %s, its block has %s values [z][y][x]" % (name, view.shape, shape))
+        if len(components) > 1:
+            raise ValueError("the arrays of '%s' are %s; write the same number of components for all blocks" % (
+                name, " and ".join(str(view.shape) for view in present)))
         pointers = (ctypes.c_void_p * max(len(views), 1))(*(None if view is None else view.ctypes.data for view in views))
         strides = (_Strides * max(len(views), 1))(
             *(_Strides() if view is None else _Strides(view.strides[2::-1], view.strides[3] if view.ndim == 4 else 0)
               for view in views))
-        return _TYPES[types.pop()], components.pop(), pointers, strides
+        return _TYPES[present[0].dtype if present else np.dtype("float64")], components.pop(), pointers, strides
 
     def set_particles(self, name, positions, weights=None, lengths=None, density=False):
         """Makes a cell array of this rank's particles, which may lie in blocks of any rank: the particles' weight in each
@@ -250,18 +326,26 @@ class Catalyst:
         Arrays are kept alive and used in place: change them in place between steps, or set others when their number
         changes. Raises ValueError for shapes that don't fit and for types other than float32 and float64; ranks without such
         a fault raise CatalystError then."""
-        with _or_refused(self._library.vdi_catalyst_set_particles, self._handle, b"refused", None):
+        with self._or_refused():
+            key = _faults.name_bytes(name)
             made, kept = _particles(positions, weights, lengths, density)
-        self._check(self._library.vdi_catalyst_set_particles(self._handle, name.encode(), made))
+        self._check(self._library.vdi_catalyst_set_particles(self._handle, key, made))
         self._kept[_CELLS, name] = kept  # an array of cells, as far as the engine is concerned
 
     def wants(self, step, time=0.0):
         """True if this step makes anything, the same on all ranks; if not, there is no need to call execute."""
-        return self._library.vdi_catalyst_wants(self._handle, step, time) != 0
+        with self._or_refused(self._library.vdi_catalyst_wants, -1, 0.0):
+            step, time = _faults.whole_number("the step", step, "int(step)"), float(time)
+        wanted = self._library.vdi_catalyst_wants(self._handle, step, time) != 0
+        if not wanted:
+            self._raise_if_busy()
+        return wanted
 
     def execute(self, step, time=0.0):
         """Makes what the scripts or the JSON ask for, from the current values. `step` is the same on all ranks and at least 0,
         with scripts below 2**31, and `time` is finite."""
+        with self._or_refused(self._library.vdi_catalyst_execute, -1, 0.0):
+            step, time = _faults.whole_number("the step", step, "int(step)"), float(time)
         self._check(self._library.vdi_catalyst_execute(self._handle, step, time))
 
     def parameter(self, name, value, low, high):
@@ -270,30 +354,64 @@ class Catalyst:
         value, and later calls any bounds, too. The parameter takes only whole numbers if all three are of type int. Call it at
         each step, on all ranks; values change only in execute. Raises ValueError on all ranks unless the first value lies
         between finite bounds, and for an invalid name, another type than before, or a 65th parameter."""
-        whole = all(isinstance(number, int) for number in (value, low, high))
+        with self._or_refused():
+            key = _faults.name_bytes(name)
+            whole = all(isinstance(number, int) for number in (value, low, high))
+            if not whole:
+                value, low, high = float(value), float(low), float(high)
         ask = self._library.vdi_catalyst_parameter_i64 if whole else self._library.vdi_catalyst_parameter_f64
-        in_force = ask(self._handle, name.encode(), value, low, high)
-        error = self._library.vdi_catalyst_error(self._handle)  # empty after a success
+        in_force = ask(self._handle, key, value, low, high)
+        self._raise_if_busy()
+        error = self._error()  # empty after a success
         if error:
-            raise ValueError(error.decode(errors="replace"))
+            self._raise(ValueError(error))
         return in_force
 
     def close(self):
-        """Ends the run and its engine, before MPI is finalized. A second call does nothing."""
-        if self._handle:
-            handle, self._handle = self._handle, ctypes.c_void_p()
-            self._kept = {}
-            code = self._library.vdi_catalyst_finalize(handle)
-            if code != 0:
-                raise CatalystError(code, "the engine didn't end well")
+        """Ends the run, before MPI is finalized. A second call does nothing. ParaView stays for another run with scripts."""
+        code = self._run.end()
+        if code == BUSY:
+            self._check(code)
+        self._kept = {}
+        self._check(code)
 
     def __enter__(self):
         return self
 
-    def __exit__(self, *error):
-        self.close()
+    def __exit__(self, kind, error, trace):
+        # Only all ranks together can end a run. If this one fails alone, the others wait in a step, not here.
+        if error is None or self._is_alone or error is self._shared_error:
+            self.close()
+
+    @contextlib.contextmanager
+    def _or_refused(self, call=None, *arguments):
+        """If the block raises, takes part in the call that the other ranks make, and fails it on all of them: by the text of
+        the exception or, if a call is given, by arguments that fail."""
+        try:
+            yield
+        except Exception as error:
+            if call:
+                call(self._handle, *arguments)
+            else:
+                self._library.vdi_catalyst_refuse(self._handle, (str(error) or repr(error)).encode())
+            self._shared_error = error
+            raise
+
+    def _error(self):
+        """The text of the last error; "" if there was none."""
+        return self._library.vdi_catalyst_error(self._handle).decode(errors="replace")
+
+    def _raise(self, error):
+        self._shared_error = error
+        raise error
+
+    def _raise_if_busy(self):
+        text = self._error()
+        if "VDI_CATALYST_BUSY" in text:
+            raise CatalystError(BUSY, text)
 
     def _check(self, code):
+        if code == BUSY:
+            raise CatalystError(code, self._error())
         if code != 0:
-            text = self._library.vdi_catalyst_error(self._handle) or b"the first rank has said why"
-            raise CatalystError(code, text.decode(errors="replace"))
+            self._raise(CatalystError(code, self._error() or "this run has ended, by close() or by a later one"))
