@@ -40,6 +40,7 @@ struct ServeOptions {
   std::string certificate;
   std::string key;
   std::vector<std::string> origins;
+  std::vector<std::string> embedders;
   std::string rate;
   std::uint32_t viewers = 64;
   bool isFinished = false;
@@ -120,6 +121,8 @@ stream::ServerOptions serverOf(const ServeOptions& options, const std::string& k
   server.token = known.empty() ? stream::randomToken() : known;
   server.page = page::emptyPage("Live");
   server.origins = options.origins;
+  server.originOption = "--origin {}";
+  server.embedders = options.embedders;
   server.mostBytesPerSecond = bytesPerSecond(options.rate);
   server.mostViewers = options.viewers;
   server.certificate = options.certificate;
@@ -171,6 +174,11 @@ void addServerOptions(CLI::App& command, ServeOptions& options) {
                   "another site whose pages may connect, such as https://example.org")
       ->type_name("ORIGIN")
       ->check(requireOrigin);
+  command
+      .add_option("--embed-in", options.embedders,
+                  "a site whose pages may show this page in a frame, such as https://example.org")
+      ->type_name("ORIGIN")
+      ->check(requireOrigin);
 }
 
 }  // namespace
@@ -204,7 +212,8 @@ void addServe(CLI::App& app, Job& job) {
                                  ->add_flag("--stdio", options->isStdio,
                                             "serve one viewer at standard input and output instead of a port")
                                  ->excludes(from);
-  for (const char* const name : {"--host", "--port", "--token-file", "--certificate", "--key", "--origin"})
+  for (const char* const name :
+       {"--host", "--port", "--token-file", "--certificate", "--key", "--origin", "--embed-in"})
     stdio->excludes(command->get_option(name));
   command->callback([options, &job] {
     if (options->inputs.empty() && options->from.empty())

@@ -11,7 +11,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <map>
-#include <regex>
 #include <string_view>
 
 #include "vdi/core/Error.h"
@@ -51,8 +50,9 @@ void hideTokens(std::span<char* const> arguments) {
   constexpr std::string_view name = "token=";
   for (char* const argument : arguments) {
     const std::string_view text(argument);
-    const std::size_t fragment = std::min(text.find('#'), text.size());
-    for (std::size_t at = text.find(name, fragment); at != std::string_view::npos; at = text.find(name, at)) {
+    const std::size_t more =
+        std::min(text.find_first_of("?#"), text.size());  // a proxy may have a token, too
+    for (std::size_t at = text.find(name, more); at != std::string_view::npos; at = text.find(name, at)) {
       at += name.size();
       const std::size_t end = std::min(text.find_first_of("& '\"", at), text.size());
       std::fill(argument + at, argument + end, 'x');
@@ -92,14 +92,8 @@ std::string requireRate(const std::string& text) {
 }
 
 std::string requireOrigin(const std::string& text) {
-  static const std::regex form(R"((https?)://([a-z0-9._-]+|\[[0-9a-f:.]+\])(:([1-9][0-9]*))?)");
-  std::smatch parts;
-  const bool isWhole = std::regex_match(text, parts, form);
-  const bool hasUsualPort = isWhole && parts[4] == (parts[1] == "https" ? "443" : "80");
-  if (isWhole && !hasUsualPort) return "";
-  return "'" + text +
-         "' is not an origin, such as https://example.org or http://example.org:8080: lower case, without a "
-         "path and without the usual port";
+  if (stream::isOrigin(text)) return "";
+  return fmt::format("'{}' is {}", text, stream::notAnOrigin);
 }
 
 }  // namespace vdi::apps

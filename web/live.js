@@ -7,6 +7,7 @@ import {LevelAssembler, STREAM_VERSION, StreamError, extendedSeries, serverMessa
 /** @typedef {import("./messages.js").Level} Level */
 /** @typedef {import("./messages.js").Series} Series */
 /** @typedef {import("./messages.js").Steering} Steering */
+/** @typedef {import("./reach.js").Reason} Reason */
 /** @typedef {import("./messages.js").Wish} Wish */
 /** @typedef {import("./messages.js").Welcome} Welcome */
 
@@ -37,6 +38,7 @@ import {LevelAssembler, STREAM_VERSION, StreamError, extendedSeries, serverMessa
 /**
  * @typedef {object} LiveOptions
  * @property {() => Socket} open
+ * @property {() => Promise<Reason>} [reason] why the last connection didn't open
  * @property {string} token
  * @property {(file: Uint8Array) => Promise<PreparedVdi>} decode
  * @property {(vdi: PreparedVdi, level: Arrived) => Promise<boolean> | boolean} onLevel shows a level,
@@ -163,13 +165,19 @@ export class Live {
     this.socket = socket;
     socket.binaryType = "arraybuffer";
     const has = this.shown?.session === this.session && this.isFull();
-    socket.onopen = () => this.send({type: "hello", version: STREAM_VERSION, token: this.options.token,
-                                     session: this.session || null, have: has ? this.shown?.frame : null});
+    let isOpen = false;
+    socket.onopen = () => {
+      isOpen = true;
+      this.send({type: "hello", version: STREAM_VERSION, token: this.options.token,
+                 session: this.session || null, have: has ? this.shown?.frame : null});
+    };
     socket.onmessage = ({data}) => {
       if (socket === this.socket) this.receive(data);
     };
     socket.onclose = ({code}) => {
-      if (socket === this.socket) this.onClose(code);
+      if (socket !== this.socket) return;
+      this.onClose(code);
+      if (!isOpen && this.state === "lost") this.askForReason();
     };
     this.timer = setTimeout(() => this.lose("the server doesn't answer"), ANSWER_MS);
   }
@@ -191,6 +199,15 @@ export class Live {
     if (code === WRONG_TOKEN) this.refuse("the server rejects the token in this link; use the link that it printed last");
     else if (code === OTHER_VERSION) this.refuse(this.cause || "the server uses another protocol version; reload this page");
     else this.lose(this.cause || "the server doesn't answer");
+  }
+
+  /** Asks why the connection didn't open, unless the next attempt begins before the answer comes. */
+  async askForReason() {
+    const {failures} = this;
+    const reason = await this.options.reason?.();
+    if (!reason || this.state !== "lost" || failures !== this.failures) return;
+    if (reason.isFinal) this.refuse(reason.cause);
+    else this.change("lost", reason.cause || "the server doesn't answer");
   }
 
   /** @param {string} cause one that another attempt won't remove */

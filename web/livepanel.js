@@ -2,6 +2,7 @@
 
 import {Live} from "./live.js";
 import {SUBPROTOCOL} from "./messages.js";
+import {reasonOf} from "./reach.js";
 
 /** @typedef {import("./decoder.js").Decoder} Decoder */
 /** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
@@ -97,13 +98,15 @@ export class LivePanel {
   constructor(token, decoder, view) {
     this.view = view;
     const url = new URL("stream", location.href);
-    url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
     url.hash = url.search = "";
+    const plain = new URL(url);
+    url.protocol = location.protocol === "https:" ? "wss:" : "ws:";
     /** @type {(() => void)[]} called at each change of `live` */
     this.listeners = [];
     this.live = new Live({
       token,
       open: () => new WebSocket(url, SUBPROTOCOL),
+      reason: () => reasonOf(plain, location.origin),
       decode: (file) => decoder.decode({file}),
       onLevel: (vdi, level) => view.show(vdi, level),
       onChange: () => this.onChange(),

@@ -160,6 +160,7 @@ TEST_CASE("everything at once") {
     "max_share": 0.05, "max_device_mib": 512, "max_host_mib": 9000, "existing": "continue", "isolation": {"restart": true, "patience": 20},
     "log": {"json": "run.jsonl", "text": "run.log"},
     "stream": {"host": "::1", "port": 8080, "token_file": "t", "link_file": "l", "certificate": "c", "key": "k",
+               "origins": ["https://a.example"], "embed_in": ["https://b.example", "http://c.example"],
                "megabits": 100, "steer": true, "steering_log": "s"}})",
                            "vdi.json");
   CHECK(run.cells == std::optional<bool>(false));
@@ -176,6 +177,8 @@ TEST_CASE("everything at once") {
   CHECK(run.log.json == "run.jsonl");
   CHECK(run.log.text == "run.log");
   CHECK(run.stream->port == 8080);
+  CHECK(run.stream->origins == std::vector<std::string>{"https://a.example"});
+  CHECK(run.stream->embedIn == std::vector<std::string>{"https://b.example", "http://c.example"});
   CHECK(run.stream->megabits == 100.0);
   CHECK(run.stream->steer);
   CHECK(run.stream->steeringLog == "s");

@@ -4,10 +4,15 @@ import gzip
 import json
 import os
 import signal
+import pathlib
 import subprocess
+import sys
 import urllib.request
 
 from pagetest import HEIGHT, VDI, WIDTH, azimuth, bare, camera_of, check, compare, message_of, rendered, run, shown, vdi, whole
+
+sys.path.append(str(pathlib.Path(__file__).parents[1] / "stream"))
+from proxy import BARE, NGINX, USUAL, Nginx, example  # noqa: E402
 
 TOKEN = "a-token-of-this-test-0123456789abcdef"
 SECONDS = 60  # limit of each wait, on a busy machine
@@ -165,6 +170,36 @@ def test_tls(browser):
         check_requests(browser, server, "wss://")
         check(not browser.complaints(), f"over TLS: {browser.complaints()}")
     browser.send("Security.setIgnoreCertificateErrors", ignore=False)
+
+
+def test_proxies(browser):
+    """Behind nginx, at a path of its own: with the guide's example, and with settings that don't work."""
+    if not NGINX:
+        print("nginx is missing", flush=True)
+        return
+    make("proxied.vdi", 18, large=False)
+
+    def state():
+        return browser.value("vdiPage.live.live.state"), line(browser), message_of(browser)
+
+    def opens(proxy):
+        browser.open(f"{proxy.address}?lab=1#token={TOKEN}")
+
+    with Server("proxied.vdi") as server:
+        with Nginx(server.port, example()) as proxy:
+            opens(proxy)
+            wait_for_frame(browser, 0)
+        with Nginx(server.port, USUAL) as proxy:
+            opens(proxy)
+            browser.wait("window.vdiPage && vdiPage.live.live.state === 'refused'", SECONDS)
+            check(f"--origin {proxy.origin}" in message_of(browser), f"a refused origin: {state()}")
+        with Nginx(server.port, BARE) as proxy:
+            opens(proxy)
+            browser.wait("window.vdiPage && vdiPage.live.live.cause.includes('WebSockets')", SECONDS)
+            check(state()[0] in ("lost", "connecting"), f"a proxy without WebSockets: {state()}")
+            server.end()
+            browser.wait("vdiPage.live.live.cause.includes('HTTP status 502')", SECONDS)
+        browser.wait("vdiPage.live.live.cause === \"the server doesn't answer\"", SECONDS)
 
 
 def check_requests(browser, server, scheme):
@@ -345,4 +380,4 @@ def test_steering(browser):
     browser.send("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
 
 
-run(test_frames, test_size, test_tokens, test_tls, test_pages, test_series, test_missing_frame, test_steering)
+run(test_frames, test_size, test_tokens, test_tls, test_proxies, test_pages, test_series, test_missing_frame, test_steering)

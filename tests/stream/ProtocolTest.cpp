@@ -278,14 +278,37 @@ TEST_CASE("links") {
   CHECK(parseUrl("http://host#camera=1&token=xyz").token == "xyz");
   CHECK(parseUrl("http://[::1]:99/").host == "::1");
   CHECK(parseUrl("http://[::1]:99/").authority() == "[::1]:99");
+  CHECK(parseUrl("http://h:80/#token=a").streamTarget() == "/stream");
+  CHECK(parseUrl("http://h").streamTarget() == "/stream");
+  for (const char* const folder :
+       {"https://h/user/ada/proxy/8080/#token=abc", "https://h/user/ada/proxy/8080#token=abc"}) {
+    CHECK(parseUrl(folder).streamTarget() == "/user/ada/proxy/8080/stream");
+    CHECK(parseUrl(folder).token == "abc");
+    CHECK(parseUrl(folder).host == "h");
+  }
+  CHECK(parseUrl("https://h/a/?lab=1&x=/#token=abc").streamTarget() == "/a/stream?lab=1&x=/");
+  CHECK(parseUrl("https://h?lab=1#token=abc").streamTarget() == "/stream?lab=1");
   for (const std::string bad :
        {"", "host:80", "ftp://h/", "http://", "http://:80/", "http://h:0/", "http://h:66000/",
-        "http://h:8x/#token=secret", "http://h:80/page#token=secret", "http://[::1/"}) {
+        "http://h:8x/#token=secret", "http://h:0/?token=secret", "http://h/a b#token=secret",
+        "http://h/a\r\nX: y#token=secret", "http://h/?a b", "http://[::1/"}) {
     INFO(bad);
     const Error error = test::errorOf([&] { parseUrl(bad); });
     CHECK(error.code() == ErrorCode::InvalidArgument);
     CHECK(std::string(error.what()).find("secret") == std::string::npos);
   }
+}
+
+TEST_CASE("targets of requests") {
+  CHECK(pathOf("/?a=b") == "/");
+  CHECK(pathOf("/stream?a") == "/stream");
+  CHECK(pathOf("/a") == "/a");
+  CHECK(queryField("/stream?x=1&origin=https%3A%2F%2Fa.example&y", "origin") == "https://a.example");
+  CHECK(queryField("/stream?origin=%", "origin") == "%");
+  CHECK(queryField("/stream?origin=%4", "origin") == "%4");
+  CHECK(queryField("/stream?origins=1", "origin").empty());
+  CHECK(queryField("/stream", "origin").empty());
+  CHECK(queryField("", "origin").empty());
 }
 
 TEST_CASE("the page's scripts are named by their digests") {

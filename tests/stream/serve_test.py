@@ -10,6 +10,7 @@ import threading
 import time
 import unittest
 
+from proxy import BARE, NGINX, Nginx, example
 from tool import PATIENCE, VDI, ServedFolder, make, receive, run, until
 from viewer import Closed, OneViewer, Refused
 
@@ -212,8 +213,19 @@ class ServeTest(ServedFolder):
         self.assertNotIn("unsafe-inline' 'sha256", policy)
         self.assertEqual(reply.getheader("Referrer-Policy"), "no-referrer")
         self.assertEqual(reply.getheader("X-Content-Type-Options"), "nosniff")
-        for path in ("/small0.vdi", "//etc/passwd", "/../small0.vdi", "/%2e%2e/", "/stream", "/index.html", "/?"):
+        for path in ("/small0.vdi", "//etc/passwd", "/../small0.vdi", "/%2e%2e/", "/index.html", "/stream/"):
             self.assertEqual(server.get(path)[0].status, 404, path)
+        for path in ("/?", "/?a=b/c", "/?token=x&y"):
+            self.assertEqual(server.get(path)[1], body, path)
+        self.assertEqual(server.get("/status?x", Authorization="Bearer " + server.token)[0].status, 200)
+        # What a page asks when its WebSocket didn't open.
+        own = f"http://127.0.0.1:{server.port}"
+        for target, status in (("/stream", 426), (f"/stream?origin={own}", 426), ("/stream?origin=https%3A%2F%2Fa.example", 403)):
+            self.assertEqual(server.get(target)[0].status, status, target)
+        self.assertIn("frame-ancestors 'none'", policy)
+        desk = self.serve(self.live, "--embed-in", "https://desk.example", "--embed-in", "http://b.example:81")
+        policy = desk.get("/")[0].getheader("Content-Security-Policy")
+        self.assertTrue(policy.endswith("frame-ancestors https://desk.example http://b.example:81"), policy)
 
     def test_http(self):
         """Status codes for requests that aren't understood, and for other methods."""
@@ -265,15 +277,43 @@ class ServeTest(ServedFolder):
         for origin in ("https://other.example", "null", "http://127.0.0.1", f"http://127.0.0.1:{server.port}.example"):
             with self.assertRaises(Refused, msg=origin):
                 self.view(server, origin=origin)
+        # Each refused origin got one line, which names the option that allows it.
+        for origin in ("https://other.example", "null", "https://" + "x" * 400):
+            with self.assertRaises(Refused):
+                self.view(server, origin=origin)
+        lines = server.said().splitlines()
+        self.assertEqual(len(lines), 3, lines)  # one for all whose names are no origins
+        self.assertEqual(lines[0], "vdi: pages of https://other.example may not connect; to allow it, use "
+                                   "--origin https://other.example")
         with self.assertRaises(Refused):
             self.view(server, protocol="pv-vdi.2")
         with self.assertRaises(Refused):
             self.view(server, target="/")
 
+    @unittest.skipUnless(NGINX, "nginx is missing")
+    def test_behind_a_proxy(self):
+        server = self.serve(self.made / "small0.vdi", "--finished")
+        with Nginx(server.port, example()) as proxy:
+            link = proxy.address + "#token=" + server.token
+            relay = self.serve("--from", link)
+            for address in (link, link.replace("/#", "#"), relay.link):
+                done = receive(address, "-o", self.folder / "got")
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertEqual((self.folder / "got" / "vdi_000000.vdi").read_bytes(), self.bytes_of("small0"))
+                shutil.rmtree(self.folder / "got")
+            done = receive(link.replace("/vdi/", "/other/"), "--frames", 1)
+            self.assertEqual((done.returncode, done.stderr.count("HTTP status 404")), (1, 1), done.stderr)
+        self.assertEqual(server.said(), "")
+        with Nginx(server.port, BARE) as proxy:
+            self.assertEqual(receive(proxy.address + "#token=" + server.token, "--frames", 1).returncode, 1)
+        self.assertEqual(server.said().count("\n"), 1, server.said())
+        self.assertIn("passes no WebSockets on", server.said())
+
     def test_options_that_could_not_work(self):
-        wrong = [["--origin", text] for text in ("foo", "null", "https://a.example/", "https://a.example/path", "a.example",
-                                                 "HTTPS://a.example", "https://A.example", "https://a.example:443",
-                                                 "http://a.example:80", "http://a.example:", "http://:8080", "*", "")]
+        texts = ("foo", "null", "https://a.example/", "https://a.example/path", "a.example", "HTTPS://a.example",
+                 "https://A.example", "https://a.example:443", "http://a.example:80", "http://a.example:", "http://:8080",
+                 "*", "", "http://a.example:08", "https://u@a.example", "http://[::1")
+        wrong = [["--origin", text] for text in texts] + [["--embed-in", "*"]]
         for arguments in [*wrong, ["--viewers", "0"]]:
             done = run("serve", self.live, *arguments)
             self.assertEqual(done.returncode, 2, arguments)

@@ -68,6 +68,8 @@ struct RunStream {
   std::string linkFile = "vdi-stream.link";  // empty: the link isn't stored
   std::string certificate;
   std::string key;
+  std::vector<std::string> origins;                // of other sites' pages that may connect
+  std::vector<std::string> embedIn;                // origins of sites that may show the page in a frame
   double megabits = 0.0;                           // rate to each viewer in Mbit/s; 0: no limit
   bool steer = false;                              // viewers may change the run
   std::string steeringLog = "vdi-steering.jsonl";  // gets a line for each change; empty: none

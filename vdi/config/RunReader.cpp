@@ -396,6 +396,13 @@ RunLogFiles logOf(const JsonValue& value) {
   return files;
 }
 
+/// Origins of sites. The server checks how they are written.
+std::vector<std::string> originsOf(const JsonValue& value) {
+  std::vector<std::string> origins;
+  for (const JsonValue& origin : value.items()) origins.push_back(origin.text());
+  return origins;
+}
+
 std::optional<RunStream> streamOf(const JsonValue& value) {
   if (value.isFlag()) return value.flag() ? std::optional<RunStream>(RunStream()) : std::nullopt;
   value.requireObject(fieldsOf("/stream"));
@@ -408,6 +415,8 @@ std::optional<RunStream> streamOf(const JsonValue& value) {
   ifThere(value, "link_file", [&](const JsonValue& file) { stream.linkFile = file.text(); });
   ifThere(value, "certificate", [&](const JsonValue& file) { stream.certificate = file.text(); });
   ifThere(value, "key", [&](const JsonValue& file) { stream.key = file.text(); });
+  ifThere(value, "origins", [&](const JsonValue& origins) { stream.origins = originsOf(origins); });
+  ifThere(value, "embed_in", [&](const JsonValue& origins) { stream.embedIn = originsOf(origins); });
   ifThere(value, "megabits", [&](const JsonValue& rate) { stream.megabits = positiveOf(rate); });
   ifThere(value, "steer", [&](const JsonValue& steer) { stream.steer = steer.flag(); });
   ifThere(value, "steering_log", [&](const JsonValue& file) {
@@ -482,8 +491,8 @@ const std::map<std::string, std::vector<std::string>>& runFields() {
       {"/colors", {"preset", "file", "name", "range", "opacities", "unit_distance"}},
       {"/output", {"vdi", "png", "cinema", "latest"}},
       {"/stream",
-       {"host", "port", "token_file", "link_file", "certificate", "key", "megabits", "steer",
-        "steering_log"}},
+       {"host", "port", "token_file", "link_file", "certificate", "key", "origins", "embed_in", "megabits",
+        "steer", "steering_log"}},
       {"/log", {"json", "text"}},
       {"/isolation", {"restart", "patience"}},
   };

@@ -97,7 +97,8 @@ class SocketConnection : public Connection, public std::enable_shared_from_this<
 
   void answer() {
     const HttpRequest& request = parser_.get();
-    if (!boost::beast::websocket::is_upgrade(request) || request.target() != "/stream") {
+    if (!boost::beast::websocket::is_upgrade(request) ||
+        pathOf({request.target().data(), request.target().size()}) != "/stream") {
       send(surroundings_.site.reply(request));
       return;
     }

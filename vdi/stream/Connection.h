@@ -16,7 +16,7 @@ namespace vdi::stream {
 /// The parts of a server that its connections use, and that outlive them. Each connection calls `leave` once.
 struct Surroundings {
   Hub& hub;
-  const Site& site;
+  Site& site;
   std::function<void()> leave;
 };
 

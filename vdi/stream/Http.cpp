@@ -1,5 +1,7 @@
 #include "vdi/stream/Http.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>  // fmt::join
 #include <openssl/evp.h>
 #include <openssl/sha.h>
 
@@ -10,10 +12,12 @@
 #include <boost/beast/http/field.hpp>
 #include <boost/beast/http/rfc7230.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
+#include <charconv>
 #include <string_view>
 #include <utility>
 
 #include "vdi/stream/Protocol.h"
+#include "vdi/stream/Url.h"
 
 namespace vdi::stream {
 
@@ -80,15 +84,40 @@ std::string scriptSources(const std::string& page) {
   return sources.empty() ? "'none'" : sources;
 }
 
-Site::Site(std::string page, const std::string& token, std::vector<std::string> origins,
-           std::function<std::string()> status)
-    : page_(std::move(page)),
-      policy_("default-src 'none'; script-src " + scriptSources(page_) +
-              "; style-src 'unsafe-inline'; img-src data: blob:; worker-src blob:; connect-src 'self'; "
-              "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"),
-      token_(token),
-      origins_(std::move(origins)),
-      status_(std::move(status)) {}
+std::string_view pathOf(std::string_view target) {
+  return target.substr(0, target.find('?'));
+}
+
+std::string queryField(std::string_view target, std::string_view name) {
+  constexpr int hex = 16;
+  std::string_view query = target.substr(pathOf(target).size());
+  query.remove_prefix(std::min<std::size_t>(query.size(), 1));
+  while (!query.empty()) {
+    const std::string_view part = query.substr(0, query.find('&'));
+    query.remove_prefix(std::min(part.size() + 1, query.size()));
+    if (!part.starts_with(name) || part.substr(name.size()).substr(0, 1) != "=") continue;
+    std::string value;
+    for (std::string_view rest = part.substr(name.size() + 1); !rest.empty();) {
+      unsigned char code = 0;
+      const char* const digits = rest.data() + 1;
+      const bool isCoded = rest.size() > 2 && rest.front() == '%' &&
+                           std::from_chars(digits, digits + 2, code, hex).ptr == digits + 2;
+      value += isCoded ? static_cast<char>(code) : rest.front();
+      rest.remove_prefix(isCoded ? 3 : 1);
+    }
+    return value;
+  }
+  return {};
+}
+
+Site::Site(SiteOptions options)
+    : options_(std::move(options)),
+      policy_(
+          "default-src 'none'; script-src " + scriptSources(options_.page) +
+          "; style-src 'unsafe-inline'; img-src data: blob:; worker-src blob:; connect-src 'self'; "
+          "base-uri 'none'; form-action 'none'; frame-ancestors " +
+          (options_.embedders.empty() ? "'none'" : fmt::format("{}", fmt::join(options_.embedders, " ")))),
+      token_(options_.token) {}
 
 HttpReply Site::refusal(const HttpRequest& request, const std::string& cause) {
   return replyTo(request, http::status::forbidden, "text/plain; charset=utf-8", cause + "\n");
@@ -104,19 +133,35 @@ HttpReply Site::fault(boost::beast::error_code error) {
                  "this isn't an HTTP request\n");
 }
 
-HttpReply Site::reply(const HttpRequest& request) const {
+HttpReply Site::reply(const HttpRequest& request) {
   const bool reads = request.method() == http::verb::get || request.method() == http::verb::head;
   const std::string_view target = plain(request.target());
-  if (reads && target == "/") {
-    HttpReply reply = replyTo(request, http::status::ok, "text/html; charset=utf-8", page_);
+  const std::string_view path = pathOf(target);
+  if (reads && path == "/") {
+    HttpReply reply = replyTo(request, http::status::ok, "text/html; charset=utf-8", options_.page);
     reply.set("Content-Security-Policy", policy_);
+    if (!options_.embedders.empty()) reply.set("Cross-Origin-Resource-Policy", "cross-origin");
     return reply;
   }
-  if (reads && target == "/status") {
+  if (reads && path == "/stream") {
+    if (request.find(http::field::sec_websocket_key) != request.end())
+      sayOnce(
+          "a proxy in front of this server passes no WebSockets on: the headers Upgrade and Connection are "
+          "missing");
+    const std::string origin = queryField(target, "origin");
+    if (!origin.empty() && !admitsOrigin(origin, field(request, http::field::host)))
+      return refusal(request, refusalOf(origin));
+    HttpReply reply = replyTo(request, http::status::upgrade_required, "text/plain; charset=utf-8",
+                              "this address speaks WebSocket only\n");
+    reply.set(http::field::upgrade, "websocket");
+    reply.set(http::field::connection, "upgrade, close");
+    return reply;
+  }
+  if (reads && path == "/status") {
     constexpr std::string_view scheme = "Bearer ";
     const std::string given = spelledAs(scheme, field(request, http::field::authorization));
     if (given.starts_with(scheme) && token_.accepts(given.substr(scheme.size())))
-      return replyTo(request, http::status::ok, "application/json", status_());
+      return replyTo(request, http::status::ok, "application/json", options_.status());
     HttpReply reply = replyTo(request, http::status::unauthorized, "text/plain; charset=utf-8",
                               "the status requires the token\n");
     reply.set(http::field::www_authenticate, "Bearer");
@@ -132,7 +177,35 @@ HttpReply Site::reply(const HttpRequest& request) const {
   return replyTo(request, http::status::not_found, "text/plain; charset=utf-8", "not found\n");
 }
 
-bool Site::admits(const HttpRequest& request, std::string& cause) const {
+bool Site::admitsOrigin(std::string_view origin, std::string_view host) const {
+  if (std::ranges::find(options_.origins, origin) != options_.origins.end()) return true;
+  if (host.empty()) return false;
+  // Proxies may add the usual port to Host. Browsers never add it to Origin.
+  for (const auto& [scheme, port] : {std::pair("http://", ":80"), std::pair("https://", ":443")}) {
+    const std::string own = scheme + std::string(host);
+    if (origin == own || std::string(origin) + port == own) return true;
+  }
+  return false;
+}
+
+std::string Site::refusalOf(std::string_view origin) const {
+  // Other texts may be long, or not fit for a terminal.
+  if (!isOrigin(origin)) return "a page without an origin, such as one in a sandboxed frame, may not connect";
+  std::string option = options_.originOption;
+  const std::size_t place = option.find("{}");
+  if (place == std::string::npos) return fmt::format("pages of {} may not connect", origin);
+  option.replace(place, 2, origin);
+  return fmt::format("pages of {} may not connect; to allow it, use {}", origin, option);
+}
+
+void Site::sayOnce(const std::string& line) {
+  constexpr std::size_t most = 32;
+  if (said_.size() >= most || std::ranges::find(said_, line) != said_.end()) return;
+  said_.push_back(line);
+  if (options_.log) options_.log(line);
+}
+
+bool Site::admits(const HttpRequest& request, std::string& cause) {
   const auto protocols = field(request, http::field::sec_websocket_protocol);
   if (!http::token_list({protocols.data(), protocols.size()}).exists(subprotocol)) {
     cause = std::string("this server speaks ") + subprotocol;
@@ -141,10 +214,9 @@ bool Site::admits(const HttpRequest& request, std::string& cause) const {
   const auto found = request.find(http::field::origin);
   if (found == request.end()) return true;  // not a browser
   const std::string_view origin = plain(found->value());
-  const std::string host(field(request, http::field::host));
-  const bool isOwn = !host.empty() && (origin == "http://" + host || origin == "https://" + host);
-  if (isOwn || std::find(origins_.begin(), origins_.end(), origin) != origins_.end()) return true;
-  cause = "pages of this origin may not connect";
+  if (admitsOrigin(origin, field(request, http::field::host))) return true;
+  cause = refusalOf(origin);
+  sayOnce(cause);
   return false;
 }
 

@@ -159,22 +159,23 @@ class SocketLine : public Line, public std::enable_shared_from_this<SocketLine> 
     }));
     socket_.read_message_max(maxServerText);
     socket_.auto_fragment(false);
-    socket_.async_handshake(response_, url_.authority(), "/stream", [self = shared_from_this()](Error error) {
-      if (error == websocket::error::upgrade_declined) {
-        // A server error, such as a proxy's 502, may be temporary.
-        constexpr int serverErrors = 500;
-        const int status = static_cast<int>(self->response_.result_int());
-        self->end(0, self->name() + " has no VDIs to offer: HTTP status " + std::to_string(status),
-                  status < serverErrors);
-      } else if (error) {
-        self->fail("can't talk to " + self->name(), error);
-      } else if (!self->hasEnded_) {
-        self->isOpen_ = true;
-        self->events_.opened();
-        self->write();
-        self->read();
-      }
-    });
+    socket_.async_handshake(
+        response_, url_.authority(), url_.streamTarget(), [self = shared_from_this()](Error error) {
+          if (error == websocket::error::upgrade_declined) {
+            // A server error, such as a proxy's 502, may be temporary.
+            constexpr int serverErrors = 500;
+            const int status = static_cast<int>(self->response_.result_int());
+            self->end(0, self->name() + " has no VDIs to offer: HTTP status " + std::to_string(status),
+                      status < serverErrors);
+          } else if (error) {
+            self->fail("can't talk to " + self->name(), error);
+          } else if (!self->hasEnded_) {
+            self->isOpen_ = true;
+            self->events_.opened();
+            self->write();
+            self->read();
+          }
+        });
   }
 
   void read() {

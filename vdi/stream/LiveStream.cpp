@@ -41,6 +41,12 @@ LiveStream::LiveStream(const LiveOptions& options) {
   server.port = options.port;
   server.token = given.empty() ? randomToken() : given;
   server.page = options.page;
+  server.origins = options.origins;
+  server.originOption = options.originOption;
+  server.embedders = options.embedders;
+  server.log = [name = options.programName](const std::string& line) {
+    fmt::print(stderr, "{}: {}\n", name, line);
+  };
   server.mostBytesPerSecond = options.megabits * bytesPerMegabit;
   server.certificate = options.certificate;
   server.key = options.key;

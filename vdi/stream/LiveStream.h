@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "vdi/core/Vdi.h"
 #include "vdi/stream/Steering.h"
@@ -19,10 +20,13 @@ struct LiveOptions {
   std::string linkFile;    // empty: the link isn't stored
   std::string certificate;
   std::string key;
-  double megabits = 0.0;    // rate to each viewer in Mbit/s; 0: no limit
-  bool isSteered = false;   // viewers may change the run
-  std::string page;         // HTML, at /
-  std::string programName;  // begins the line that tells the address
+  std::vector<std::string> origins;    // ServerOptions
+  std::string originOption;            // likewise
+  std::vector<std::string> embedders;  // likewise
+  double megabits = 0.0;               // rate to each viewer in Mbit/s; 0: no limit
+  bool isSteered = false;              // viewers may change the run
+  std::string page;                    // HTML, at /
+  std::string programName;             // begins each line on standard error
 };
 
 class LiveStream {

@@ -24,6 +24,7 @@
 #include "vdi/stream/Connection.h"
 #include "vdi/stream/Http.h"
 #include "vdi/stream/Token.h"
+#include "vdi/stream/Url.h"
 #include "vdi/stream/Viewer.h"
 
 namespace vdi::stream {
@@ -50,6 +51,12 @@ std::string nameInLinks(const std::string& host) {
   return ::gethostname(name.data(), name.size() - 1) == 0 ? std::string(name.data()) : host;
 }
 
+void requireOrigins(const std::vector<std::string>& origins) {
+  for (const std::string& origin : origins) {
+    if (!isOrigin(origin)) throw Error(ErrorCode::InvalidArgument, notAnOrigin, origin);
+  }
+}
+
 std::unique_ptr<asio::ssl::context> tlsContext(const ServerOptions& options) {
   if (options.certificate.empty() && options.key.empty()) return nullptr;
   if (options.certificate.empty() || options.key.empty())
@@ -70,11 +77,13 @@ std::unique_ptr<asio::ssl::context> tlsContext(const ServerOptions& options) {
 class Server::Impl {
  public:
   explicit Impl(ServerOptions options)
-      : options_((requireToken(options.token, "token"), std::move(options))),
+      : options_((requireToken(options.token, "token"), requireOrigins(options.origins),
+                  requireOrigins(options.embedders), std::move(options))),
         tls_(tlsContext(options_)),
         hub_({options_.token, options_.mostBytesPerSecond, options_.mostViewers, options_.mostHeldBytes,
               options_.show, options_.steer, options_.log}),
-        site_(std::move(options_.page), options_.token, options_.origins, [this] { return statusText(); }),
+        site_({std::move(options_.page), options_.token, options_.origins, options_.originOption,
+               options_.embedders, [this] { return statusText(); }, options_.log}),
         acceptor_(context_),
         pause_(context_),
         patience_(context_),

@@ -20,7 +20,10 @@ struct ServerOptions {
   std::string token;                 // must satisfy requireToken
   std::string page;                  // HTML, at /
   std::vector<std::string> origins;  // of other sites' pages that may connect: "https://example.org"
-  double mostBytesPerSecond = 0.0;   // to each viewer; 0: no limit
+  /// How a user allows an origin, with {} in its place, for the line on a refused one. Empty: by no option.
+  std::string originOption;
+  std::vector<std::string> embedders;  // origins of sites that may show the page in a frame
+  double mostBytesPerSecond = 0.0;     // to each viewer; 0: no limit
   std::uint32_t mostViewers = 64;
   /// The most bytes of frames kept only because viewers still need them, without the newest frame. Beyond it,
   /// the viewer that has taken nothing for longest is disconnected.
@@ -51,8 +54,8 @@ struct ServerStatus {
 class Server {
  public:
   /// The server listens when the constructor returns. Throws Error: Io for an unavailable address, or a
-  /// certificate or key that can't be read; InvalidArgument for a token that requireToken refuses, or a
-  /// certificate without a key.
+  /// certificate or key that can't be read; InvalidArgument for a token that requireToken refuses, an
+  /// origin that isOrigin refuses, or a certificate without a key.
   explicit Server(ServerOptions options);
   /// Tells viewers that the server ends, and waits two seconds at most for them.
   ~Server();

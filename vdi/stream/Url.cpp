@@ -37,6 +37,16 @@ bool split(std::string_view authority, Url& url) {
   return port.front() == ':' && error == std::errc() && after == port.data() + port.size() && url.port != 0;
 }
 
+constexpr std::string_view plainScheme = "http://";
+constexpr std::string_view encryptedScheme = "https://";
+
+/// Whether a request may have the text in its first line.
+bool isTarget(std::string_view text) {
+  constexpr char firstVisible = '!';
+  constexpr char lastVisible = '~';
+  return std::ranges::all_of(text, [](char c) { return c >= firstVisible && c <= lastVisible; });
+}
+
 std::string tokenOf(std::string_view fragment) {
   constexpr std::string_view name = "token=";
   while (!fragment.empty()) {
@@ -54,24 +64,48 @@ std::string Url::authority() const {
   return isV6 ? fmt::format("[{}]:{}", host, port) : fmt::format("{}:{}", host, port);
 }
 
+std::string Url::streamTarget() const {
+  return folder + "stream" + query;
+}
+
 Url parseUrl(std::string_view text) {
   const std::size_t hash = std::min(text.find('#'), text.size());
-  const std::string_view address = text.substr(0, hash);
+  const std::size_t question = std::min(text.find('?'), hash);
+  const std::string_view address = text.substr(0, question);
   Url url;
-  constexpr std::string_view plainScheme = "http://";
-  constexpr std::string_view encryptedScheme = "https://";
   url.isEncrypted = address.starts_with(encryptedScheme);
   const bool isKnown = url.isEncrypted || address.starts_with(plainScheme);
   const std::string_view rest =
       isKnown ? address.substr((url.isEncrypted ? encryptedScheme : plainScheme).size()) : std::string_view();
   const std::size_t slash = std::min(rest.find('/'), rest.size());
-  const bool hasPath = rest.size() > slash + 1;
-  if (!isKnown || hasPath || !split(rest.substr(0, slash), url)) {
-    throw Error(ErrorCode::InvalidArgument, "a link must have the form http(s)://HOST:PORT/#token=TOKEN",
+  url.query = text.substr(question, hash - question);
+  if (!isKnown || !split(rest.substr(0, slash), url) || !isTarget(rest.substr(slash)) ||
+      !isTarget(url.query)) {
+    throw Error(ErrorCode::InvalidArgument, "a link must have the form http(s)://HOST:PORT/PATH/#token=TOKEN",
                 std::string(address));
   }
+  url.folder = rest.substr(slash);
+  if (!url.folder.ends_with('/')) url.folder += '/';
   url.token = tokenOf(text.substr(hash).substr(hash < text.size() ? 1 : 0));
   return url;
+}
+
+bool isOrigin(std::string_view text) {
+  constexpr std::size_t longest = 300;
+  const bool isEncrypted = text.starts_with(encryptedScheme);
+  if (text.size() > longest || !(isEncrypted || text.starts_with(plainScheme))) return false;
+  const std::string_view authority = text.substr((isEncrypted ? encryptedScheme : plainScheme).size());
+  Url url;
+  url.isEncrypted = isEncrypted;
+  constexpr std::string_view ofNames = "abcdefghijklmnopqrstuvwxyz0123456789._-";
+  constexpr std::string_view ofV6 = "abcdef0123456789:.";
+  if (!split(authority, url)) return false;
+  if (url.host.find_first_not_of(authority.starts_with('[') ? ofV6 : ofNames) != std::string::npos)
+    return false;
+  // Browsers leave out the usual port, and write others without leading zeros.
+  const std::string host = authority.starts_with('[') ? "[" + url.host + "]" : url.host;
+  const bool hasPort = url.port != (isEncrypted ? httpsPort : httpPort);
+  return authority == (hasPort ? host + ":" + std::to_string(url.port) : host);
 }
 
 }  // namespace vdi::stream

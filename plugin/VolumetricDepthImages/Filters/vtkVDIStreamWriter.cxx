@@ -9,8 +9,11 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <iterator>
+#include <sstream>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "VDIImageData.h"
 #include "VDIReport.h"
@@ -23,6 +26,11 @@ namespace {
 
 std::string textOf(const char* value) {
   return value != nullptr ? value : "";
+}
+
+std::vector<std::string> wordsOf(const char* value) {
+  std::istringstream text(textOf(value));
+  return {std::istream_iterator<std::string>(text), {}};
 }
 
 }  // namespace
@@ -39,6 +47,8 @@ vtkVDIStreamWriter::~vtkVDIStreamWriter() {
   this->vtkVDIStreamWriter::SetLinkFile(nullptr);
   this->vtkVDIStreamWriter::SetCertificate(nullptr);
   this->vtkVDIStreamWriter::SetKey(nullptr);
+  this->vtkVDIStreamWriter::SetOrigins(nullptr);
+  this->vtkVDIStreamWriter::SetEmbedIn(nullptr);
   this->vtkVDIStreamWriter::SetSteeringLog(nullptr);
 }
 
@@ -64,6 +74,9 @@ void vtkVDIStreamWriter::Start() {
                                .linkFile = textOf(this->LinkFile),
                                .certificate = textOf(this->Certificate),
                                .key = textOf(this->Key),
+                               .origins = wordsOf(this->Origins),
+                               .originOption = "Writer.Origins = \"{}\"",
+                               .embedders = wordsOf(this->EmbedIn),
                                .megabits = std::max(this->Rate, 0.0),
                                .isSteered = this->Steer,
                                .page = vdi::page::emptyPage("Live"),

@@ -47,6 +47,10 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
   vtkGetFilePathMacro(Certificate);
   vtkSetFilePathMacro(Key);
   vtkGetFilePathMacro(Key);
+  vtkSetStringMacro(Origins);  // of other sites whose pages may connect, with spaces between them
+  vtkGetStringMacro(Origins);
+  vtkSetStringMacro(EmbedIn);  // origins of sites whose pages may show the page in a frame, likewise
+  vtkGetStringMacro(EmbedIn);
   // whether viewers may ask for changes, which an extractor carries out (VDISteering.h)
   vtkSetMacro(Steer, bool);
   vtkGetMacro(Steer, bool);
@@ -87,6 +91,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
   double Rate = 0.0;
   char* Certificate = nullptr;
   char* Key = nullptr;
+  char* Origins = nullptr;
+  char* EmbedIn = nullptr;
   int TimeStep = -1;
   bool Steer = false;
   char* SteeringLog = nullptr;
