@@ -113,17 +113,28 @@ void setUpScene() {
   rayEnd = min((rayLeave - params.first) / params.step, middleOf(rayScene.y) - 1.0 + reach);
 }
 
+// Whether a place has the value of the nearest texel; else values are interpolated.
+layout(constant_id = 11) const bool takesNearest = false;
+
+// The size of a page, in texels.
+vec3 pageSize(Brick brick) { return brick.cellScale * float(cellSide); }
+
+#define READ_PAGE(i) \
+  if (pageCount == 1u ? i == 0u : pageCount > i && page == i) \
+    value = takesNearest ? texelFetch(pages[i], ivec3(coordinate * vec3(textureSize(pages[i], 0))), 0).r \
+                         : textureLod(pages[i], coordinate, 0.0).r;
+
 // Pages beyond pageCount cost nothing: comparing with a specialisation constant removes them.
 float texel(uint page, vec3 coordinate) {
   float value = 0.0;
-  if (pageCount == 1u || page == 0u) value = textureLod(pages[0], coordinate, 0.0).r;
-  if (pageCount > 1u && page == 1u) value = textureLod(pages[1], coordinate, 0.0).r;
-  if (pageCount > 2u && page == 2u) value = textureLod(pages[2], coordinate, 0.0).r;
-  if (pageCount > 3u && page == 3u) value = textureLod(pages[3], coordinate, 0.0).r;
-  if (pageCount > 4u && page == 4u) value = textureLod(pages[4], coordinate, 0.0).r;
-  if (pageCount > 5u && page == 5u) value = textureLod(pages[5], coordinate, 0.0).r;
-  if (pageCount > 6u && page == 6u) value = textureLod(pages[6], coordinate, 0.0).r;
-  if (pageCount > 7u && page == 7u) value = textureLod(pages[7], coordinate, 0.0).r;
+  READ_PAGE(0u)
+  READ_PAGE(1u)
+  READ_PAGE(2u)
+  READ_PAGE(3u)
+  READ_PAGE(4u)
+  READ_PAGE(5u)
+  READ_PAGE(6u)
+  READ_PAGE(7u)
   return value;
 }
 
@@ -184,6 +195,8 @@ float beginOf(uint k) {
 }
 float endOf(uint k) { return mix(middleOf(k), beginOf(k + 1u), params.slabs != 0u); }
 
+#include "nearest.glsl"
+
 // Uses a ray's intervals one by one; within a brick they leave no gaps.
 void useSample(float front, float back, Sample it);
 
@@ -225,16 +238,20 @@ bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
   uint first = usedFrom(begin);
   bool empty = emptyFirst < first;
   // A sample begins where the last one ends.
+  const bool readsEnds = !takesNearest || showsIsosurfaces;
   bool endsMeet = params.slabs != 0u && samplesAtOnce == 1u;
   float ends[samplesAhead + 1u];  // positions in the transfer table
   vec4 between[samplesAhead];
   bool begun = false;
   for (uint batch = empty ? first - samplesAtOnce : first; batch < end;
        batch += samplesAhead * samplesAtOnce) {
-    if (!begun || !endsMeet) ends[0] = tablePosition(brick, beginOf(batch));
+    if (readsEnds) {
+      if (!begun || !endsMeet) ends[0] = tablePosition(brick, beginOf(batch));
+      [[unroll]] for (uint i = 0u; i < samplesAhead; ++i)
+        ends[i + 1u] = tablePosition(brick, endOf(batch + i));
+    }
     begun = true;
-    [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) ends[i + 1u] = tablePosition(brick, endOf(batch + i));
-    if (!showsIsosurfaces) {
+    if (readsEnds && !showsIsosurfaces) {
       [[unroll]] for (uint i = 0u; i < samplesAhead; ++i) {
         between[i] = slabTexel(mix(ends[i + 1u], ends[i], params.slabs != 0u), ends[i + 1u]);
       }
@@ -247,9 +264,11 @@ bool castSamples(Brick brick, uint emptyBegin, uint begin, uint end) {
         Sample it = transparentSample;
         if (showsIsosurfaces) {
           if (!here) it = crossed(brick, k, ends[i], ends[i + 1u]);
+        } else if (takesNearest) {
+          if (!here) it = nearestSample(brick, k, span.y - span.x);
         } else {
           vec4 slab = slabOf(between[i], mix(ends[i + 1u], ends[i], params.slabs != 0u), ends[i + 1u]);
-          it = lit(brick, k, sampleOf(mix(slab, vec4(0.0), bvec4(here)), span.y - span.x));
+          it = lit(brick, middleOf(k), sampleOf(mix(slab, vec4(0.0), bvec4(here)), span.y - span.x));
         }
         useSample(span.x, span.y, it);
         rayOpticalDepth += it.opticalDepth;

@@ -31,9 +31,14 @@ bool castLanes(Brick brick, uint begin, uint end) {
     Sample mine = transparentSample;
     if (mayShow) {
       vec2 span = spanOf(own, own);
-      float front = tablePosition(brick, beginOf(own));
-      float back = tablePosition(brick, endOf(own));
-      mine = lit(brick, own, sampleOf(slabOf(slabTexel(front, back), front, back), span.y - span.x));
+      if (takesNearest) {
+        mine = nearestSample(brick, own, span.y - span.x);
+      } else {
+        float front = tablePosition(brick, beginOf(own));
+        float back = tablePosition(brick, endOf(own));
+        vec4 slab = slabOf(slabTexel(front, back), front, back);
+        mine = lit(brick, middleOf(own), sampleOf(slab, span.y - span.x));
+      }
     }
     uint visible = lanesWhere(mine.opticalDepth > 0.0);
     looking = visible == 0u;

@@ -20,7 +20,7 @@ float differenceOf(float ahead, float behind) {
 // zero if there is no gradient. Texels are values times a positive scale, which does not matter here.
 vec3 normalAt(Brick brick, float place) {
   vec3 middle = positionAt(place) * brick.texelScale + brick.texelOffset;
-  vec3 texels = brick.cellScale * float(cellSide);  // size of the page, in texels
+  vec3 texels = pageSize(brick);
   vec3 voxel = 1.0 / texels;
   vec3 ahead = clamp(middle + voxel, brick.texelLo, brick.texelHi);
   vec3 behind = clamp(middle - voxel, brick.texelLo, brick.texelHi);
@@ -53,9 +53,9 @@ vec3 lightAt(Brick brick, float place) {
   return light;
 }
 
-// Sample k under its light.
-Sample lit(Brick brick, uint k, Sample it) {
-  if (shaded && it.opticalDepth > 0.0) it.color *= lightAt(brick, middleOf(k));
+// A sample, or a part of one, under the light at its middle.
+Sample lit(Brick brick, float middle, Sample it) {
+  if (shaded && it.opticalDepth > 0.0) it.color *= lightAt(brick, middle);
   return it;
 }
 

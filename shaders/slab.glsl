@@ -31,7 +31,7 @@ Sample sampleOf(vec4 colorAndDepth, float length) {
 layout(constant_id = 7) const bool mayBeInfinite = true;
 layout(constant_id = 8) const bool reachesBeyond = true;
 // Whether the transfer function is in pieces.
-layout(constant_id = 11) const bool hasPieces = false;
+layout(constant_id = 12) const bool hasPieces = false;
 
 #include "pieces.glsl"
 

@@ -488,8 +488,10 @@ void RunEngine::prepare(Fields& fields, std::int64_t step, double time) {
   std::array<double, 2> largest{};  // the most values per unit of volume, and the most components
   comm.together([&] {
     blocks = fields.blocksOf(run_.field, cells, run_.component);
-    for (const Block& block : blocks)
+    for (Block& block : blocks) {
       largest[0] = std::max(largest[0], 1.0 / (block.spacing.x * block.spacing.y * block.spacing.z));
+      block.nearest = run_.settings.interpolation == Interpolation::Nearest;
+    }
     largest[1] = static_cast<double>(fields.componentsOf(run_.field, cells));
   });
   comm.allReduceMax(largest);

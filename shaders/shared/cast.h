@@ -120,6 +120,7 @@ struct CastParams {
   uint clipPlaneCount;
   uint shaded;  // 1: colours are shaded; a constant of the program
   uint blendMode;
+  uint takesNearest;  // 1: places have the values of the nearest texels; a constant of the program
   // Positions in the transfer table, ascending, and premultiplied colours and opacities.
   float isosurfacePositions[castMaxIsosurfaces];
   vec4 isosurfaceMaterials[castMaxIsosurfaces];

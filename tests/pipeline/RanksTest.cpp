@@ -136,7 +136,7 @@ TEST_CASE("an automatic sampling rate: the one that the function needs, and the 
   CHECK(rates(test::threeHues(1.0, 0.5)) == 1.0);
 }
 
-TEST_CASE("shaded: the picture and VDI of N ranks are those of one") {
+TEST_CASE("shaded, also nearest: the picture and VDI of N ranks are those of one") {
   const comm::Communicator world = comm::Communicator::world();
   const bool root = world.rank() == 0;
   VdiGenerator one(device(), comm::Communicator::serial());
@@ -152,8 +152,10 @@ TEST_CASE("shaded: the picture and VDI of N ranks are those of one") {
     const Camera camera = test::oblique(c.parallel);
     // Together, ParaView's lights make colours brighter than a supersegment can be; at 0.85 they do not. The
     // ball is cut open.
-    for (const double diffuse : {1.0, 0.85}) {
-      INFO(c.name << ", diffuse " << diffuse);
+    for (const auto& [diffuse, interpolation] :
+         {std::pair(1.0, Interpolation::Linear), std::pair(0.85, Interpolation::Linear),
+          std::pair(0.85, Interpolation::Nearest)}) {
+      INFO(c.name << ", diffuse " << diffuse << ", " << toString(interpolation));
       GenerateSettings settings = test::smallSettings();
       if (diffuse < 1.0) {
         settings.region.box = Box{{0.1, 0.0, 0.15}, {0.93, 0.8, 0.9}};
@@ -161,6 +163,7 @@ TEST_CASE("shaded: the picture and VDI of N ranks are those of one") {
       }
       settings.shading.on = true;
       settings.shading.diffuse = diffuse;
+      settings.interpolation = interpolation;
       const auto volume = many.renderVolume(camera, function, settings);
       const auto vdi = many.generate(camera, function, settings);
       if (!root) continue;

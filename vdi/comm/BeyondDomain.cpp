@@ -140,6 +140,7 @@ class Continuation {
       const int inward = below ? window.box.hi[axis] - 1 - at : at - window.box.lo[axis];
       const std::ptrdiff_t stride = window.strides[static_cast<std::size_t>(axis)];
       if (const auto value = continuedAlong(window, place.position, below ? stride : -stride, inward)) {
+        if (block_.nearest) return value;
         sum += *value;
         ++count;
       }
@@ -148,11 +149,11 @@ class Continuation {
   }
 
   /// `step` leads towards the core, where the window has `inward` more values.
-  static std::optional<double> continuedAlong(const Window& window, std::size_t position, std::ptrdiff_t step,
-                                              int inward) {
+  std::optional<double> continuedAlong(const Window& window, std::size_t position, std::ptrdiff_t step,
+                                       int inward) const {
     std::array<double, deciding> values{};
     int count = 0;
-    while (count < std::min(inward, deciding)) {
+    while (count < std::min(inward, block_.nearest ? 1 : deciding)) {
       position += static_cast<std::size_t>(step);
       if (window.known[position] == 0) break;
       values[static_cast<std::size_t>(count++)] = window.values[position];

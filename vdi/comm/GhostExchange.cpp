@@ -470,7 +470,7 @@ class LayerExchange {
     Request request{{donor.grid, exactRound, 0, glm::ivec3(0), wanted.box, glm::ivec3(1), where},
                     grid.block.origin,
                     grid.block.spacing};
-    if (grid.cells && finer) {
+    if (grid.cells && finer && !grid.block.nearest) {
       const glm::dvec3 parts = glm::round(grid.block.spacing / donor.spacing);
       request.parts = glm::ivec3(glm::clamp(parts, glm::dvec3(1.0), glm::dvec3(maxParts)));
     }
@@ -555,7 +555,9 @@ class LayerExchange {
 
   /// Cells of several levels end at different distances from the domain's faces. With a single level, the
   /// outermost values extend to the faces, as in ParaView's own volume rendering.
-  bool continuesBeyondDomain(const Grid& grid) const { return grid.cells && levels_.size() > 1; }
+  bool continuesBeyondDomain(const Grid& grid) const {
+    return grid.cells && levels_.size() > 1 && !grid.block.nearest;
+  }
 
   /// Adds the places of `wanted` that no block has: all of them, or those at edges only.
   static void addOpen(Grid& grid, const Wanted& wanted, bool all) {

@@ -42,6 +42,7 @@ Sampler::Sample Sampler::sampleAt(std::size_t axis, double place) {
   double position = (place - block_->origin[a]) / block_->spacing[a];
   const double whole = std::round(position);
   if (std::abs(position - whole) < latticeTolerance) position = whole;
+  if (block_->nearest) position = std::floor(position + 0.5);
   const double base = std::floor(position);
   const double share = position - base;
   Sample sample;

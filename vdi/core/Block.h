@@ -88,6 +88,9 @@ struct Block {
   std::shared_ptr<const OwnValues> ownValues{};
   std::optional<ByteStrides> strides{};  // where the values lie from `data` on; any alignment
   std::shared_ptr<const ComputedValues> computed{};
+  /// For Interpolation::Nearest: the exchange of ghost layers takes the nearest of the neighbours' values
+  /// where it would else mix several. Equal for all blocks of all ranks.
+  bool nearest = false;
   /// Offset of the values, in spacings, from the grid's points or cell centres. `origin` includes it.
   glm::dvec3 offset{0.0};
 

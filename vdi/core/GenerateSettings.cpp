@@ -13,6 +13,9 @@ namespace {
 constexpr EnumNames<Algorithm> algorithmNames{
     {{Algorithm::Merge, "merge"}, {Algorithm::Bisection, "bisection"}}};
 
+constexpr EnumNames<Interpolation> interpolationNames{
+    {{Interpolation::Linear, "linear"}, {Interpolation::Nearest, "nearest"}}};
+
 }  // namespace
 
 const char* toString(Algorithm algorithm) {
@@ -21,6 +24,14 @@ const char* toString(Algorithm algorithm) {
 
 Algorithm algorithmFromString(const std::string& name) {
   return namedValue(name, "algorithm", algorithmNames);
+}
+
+const char* toString(Interpolation interpolation) {
+  return nameOf(interpolation, interpolationNames);
+}
+
+Interpolation interpolationFromString(const std::string& name) {
+  return namedValue(name, "interpolation", interpolationNames);
 }
 
 float terminationOpticalDepth(const GenerateSettings& settings) {

@@ -22,12 +22,22 @@ const char* toString(Algorithm algorithm);  // "bisection", "merge"
 /// Throws Error{InvalidArgument} that lists the valid names.
 Algorithm algorithmFromString(const std::string& name);
 
+/// How values make the scalar between them: trilinear, or the value of the nearest lattice point or cell, as
+/// labels need it. The numbers are VTK's.
+enum class Interpolation : std::uint32_t { Nearest = 0, Linear = 1 };
+
+const char* toString(Interpolation interpolation);  // "nearest", "linear"
+/// Throws Error{InvalidArgument} that lists the valid names.
+Interpolation interpolationFromString(const std::string& name);
+
 /// Material behind this opacity changes no pixel by 1/255.
 constexpr double pictureTermination = 0.9999;
 
 constexpr double maxMargin = 4.0;
 
 constexpr double automaticRate = 0.0;
+/// What automaticRate becomes with Interpolation::Nearest.
+constexpr double rateOfNearest = 2.0;
 
 /// The functions of VdiGenerator throw Error{InvalidArgument} for values outside the ranges given here.
 struct GenerateSettings {
@@ -45,6 +55,8 @@ struct GenerateSettings {
   /// as the transfer function needs on the volume. automaticRate is the default of ParaView's filter and of
   /// JSON runs, but not of this struct.
   double samplesPerVoxel = 1.0;
+  /// Nearest: blocks that neighbours of other spacings touch should have Block::nearest set.
+  Interpolation interpolation = Interpolation::Linear;
   Algorithm algorithm = Algorithm::Merge;
   /// If rays have more samples than depthCodeFor can number, the VDI has full precision regardless.
   Precision precision = Precision::Compact;

@@ -63,6 +63,9 @@ const char* nameOfBudget(Budget budget) {
 const char* nameOfAlgorithm(Algorithm algorithm) {
   return toString(algorithm);
 }
+const char* nameOfInterpolation(Interpolation interpolation) {
+  return toString(interpolation);
+}
 const char* nameOfPrecision(Precision precision) {
   return toString(precision);
 }
@@ -91,6 +94,12 @@ constexpr std::array tableRows{
          .low = 1.0 / 64.0,
          .high = 64.0,
          .automatic = automaticRate}),
+    namedRow<&GenerateSettings::interpolation, nameOfInterpolation, interpolationFromString>(
+        {.name = "interpolation",
+         .property = "InterpolationType",
+         .key = "interpolation",
+         .help = "scalar between values: linear, or nearest, which shows each voxel's own value, as labels "
+                 "need it"}),
     namedRow<&GenerateSettings::algorithm, nameOfAlgorithm, algorithmFromString>(
         {.name = "algorithm",
          .property = "Algorithm",

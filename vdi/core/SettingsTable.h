@@ -44,7 +44,7 @@ struct Setting {
   void set(GenerateSettings& settings, double value) const;
 };
 
-inline constexpr std::size_t settingCount = 11;
+inline constexpr std::size_t settingCount = 12;
 std::span<const Setting, settingCount> settingsTable();
 /// The index of a setting by its property's name, which must be in the table.
 std::size_t indexOfSetting(std::string_view property);

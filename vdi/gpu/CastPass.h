@@ -62,6 +62,7 @@ class CastPass {
     bool byNeed = false;
     bool shaded = false;
     std::uint32_t blendMode = 0;
+    bool takesNearest = false;
     bool hasPieces = false;
   };
   ComputePipeline& pipelineFor(const Program& program);

@@ -90,6 +90,7 @@ shared::CastParams RayCaster::prepare(const Inputs& inputs) {
   setRegion(params, inputs.settings.region, inputs.scene);
   setLights(params, inputs.settings.shading, inputs.view);
   setBlending(params, inputs.settings.blending, inputs.table);
+  params.takesNearest = inputs.settings.interpolation == Interpolation::Nearest ? 1U : 0U;
   params.cells = volume_.cells();
   params.ranges = volume_.cellRanges();
   params.nodeCount = volume_.nodeCount();

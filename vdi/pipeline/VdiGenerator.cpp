@@ -148,8 +148,12 @@ struct VdiGenerator::State {
       const Scene& scene = steps->scene();
       TransferTable table = bake(function);
       GenerateSettings own = settings;
-      if (settings.samplesPerVoxel == automaticRate)
-        own.samplesPerVoxel = steps->samplingRate(table, settings.region);
+      if (settings.samplesPerVoxel == automaticRate) {
+        // Nearest values make right pictures at any rate, but faces between voxels lie within a sample.
+        own.samplesPerVoxel = settings.interpolation == Interpolation::Nearest
+                                  ? rateOfNearest
+                                  : steps->samplingRate(table, settings.region);
+      }
       // The compact form matters more than extra samples.
       while (settings.samplesPerVoxel == automaticRate && own.samplesPerVoxel > 1.0 &&
              !canBeCompact(scene, camera, own, *device))

@@ -47,7 +47,8 @@ bool clip(const Box& box, const glm::dvec3& origin, const glm::dvec3& direction,
 }  // namespace
 
 double ExactVolume::at(const glm::dvec3& world) const {
-  const glm::dvec3 place = glm::clamp((world - origin) / spacing, glm::dvec3(0.0), glm::dvec3(dims - 1));
+  glm::dvec3 place = glm::clamp((world - origin) / spacing, glm::dvec3(0.0), glm::dvec3(dims - 1));
+  if (nearest) place = glm::floor(place + 0.5);
   const glm::ivec3 low = glm::ivec3(glm::floor(place));
   const glm::ivec3 high = glm::min(low + 1, dims - 1);
   const glm::dvec3 share = place - glm::dvec3(low);

@@ -13,13 +13,15 @@
 
 namespace vdi::reference {
 
-/// A whole volume of doubles; trilinear between values, constant beyond the outermost ones.
+/// A whole volume of doubles; trilinear between values or the nearest one, constant beyond the outermost
+/// ones.
 struct ExactVolume {
   glm::ivec3 dims{0};          // values per axis, each >= 1
   glm::dvec3 origin{0.0};      // position of the first value, world
   glm::dvec3 spacing{1.0};     // > 0
   Box bounds;                  // the visible part: from point to point, or whole cells
   std::vector<double> values;  // [dims.z][dims.y][dims.x]
+  bool nearest = false;
 
   double at(const glm::dvec3& world) const;
 };

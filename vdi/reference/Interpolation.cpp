@@ -4,10 +4,14 @@
 
 namespace vdi::reference {
 
-double interpolate(const Block& block, const glm::dvec3& world) {
+double interpolate(const Block& block, const glm::dvec3& world, Interpolation interpolation) {
   const IndexBox all = block.extended();
   const glm::dvec3 position =
       glm::clamp((world - block.origin) / block.spacing, glm::dvec3(all.lo), glm::dvec3(all.hi - 1));
+  if (interpolation == Interpolation::Nearest) {
+    const glm::ivec3 at(glm::floor(position + 0.5));
+    return valueAt(block, at.x, at.y, at.z);
+  }
   const glm::ivec3 base = glm::min(glm::ivec3(glm::floor(position)), glm::max(all.hi - 2, all.lo));
   const glm::dvec3 share = position - glm::dvec3(base);
   // Represents infinite values by finite ones beyond all others: interpolating between opposite signs gives

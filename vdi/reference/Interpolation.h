@@ -4,11 +4,13 @@
 #include <glm/glm.hpp>
 
 #include "vdi/core/Block.h"
+#include "vdi/core/GenerateSettings.h"
 
 namespace vdi::reference {
 
-/// The trilinear value at a place, among all values of the block; places beyond the outermost values are
-/// clamped to them.
-double interpolate(const Block& block, const glm::dvec3& world);
+/// The trilinear or the nearest value at a place, among all values of the block; places beyond the outermost
+/// values are clamped to them.
+double interpolate(const Block& block, const glm::dvec3& world,
+                   Interpolation interpolation = Interpolation::Linear);
 
 }  // namespace vdi::reference

@@ -196,10 +196,24 @@ class SampledRay {
   float depthAt(float place) const { return static_cast<float>(inputs_.lattice.first) + place * ray_.step; }
   /// The scalar at a place, as a position in the transfer table.
   double positionAt(float place, const Block& block) const {
-    return inputs_.table.positionOf(interpolate(block, worldAt(place)));
+    return inputs_.table.positionOf(interpolate(block, worldAt(place), inputs_.settings.interpolation));
   }
   glm::vec3 lightOn(float place, const Block& block) const {
-    return lightAt(inputs_.settings.shading, inputs_.view, block, worldAt(place), ray_.direction);
+    return lightAt(inputs_.settings, inputs_.view, block, worldAt(place), ray_.direction);
+  }
+  /// The shares of sample k before the faces between voxels, ascending, and 1.
+  std::vector<float> facesIn(std::uint32_t k, const Block& block) const {
+    const auto voxelAt = [&](float place) { return (worldAt(place) - block.origin) / block.spacing + 0.5; };
+    const glm::dvec3 begin = voxelAt(beginOf(k));
+    const glm::dvec3 end = voxelAt(endOf(k));
+    std::vector<float> shares{1.0F};
+    for (int axis = 0; axis < 3; ++axis) {
+      const double last = std::max(begin[axis], end[axis]);
+      for (double face = std::floor(std::min(begin[axis], end[axis])) + 1.0; face < last; face += 1.0)
+        shares.push_back(static_cast<float>((face - begin[axis]) / (end[axis] - begin[axis])));
+    }
+    std::ranges::sort(shares);
+    return shares;
   }
   float middleOf(std::uint32_t k) const { return ray_.middleOf(k); }
   float lengthPerDepth() const { return glm::length(ray_.direction); }
@@ -230,16 +244,36 @@ struct Material {
   float opticalDepth = 0.0F;
 };
 
-Material slabMaterial(const RayInputs& inputs, const SampledRay& ray, std::uint32_t k, const Block& block,
-                      float length) {
+/// Material of the scalars from one place to another over a length of depth, with the light at `middle`.
+Material materialBetween(const RayInputs& inputs, const SampledRay& ray, const Block& block, float from,
+                         float to, float middle, float length) {
   const float slabsPerDepth =
       ray.lengthPerDepth() / static_cast<float>(inputs.table.unitDistance) / inputs.slabTable.length;
-  const Slab slab =
-      inputs.slabTable.between(ray.positionAt(ray.beginOf(k), block), ray.positionAt(ray.endOf(k), block));
+  const Slab slab = inputs.slabTable.between(ray.positionAt(from, block), ray.positionAt(to, block));
   const float opticalDepth = std::min(slab.opticalDepth * slabsPerDepth * length, maxExtinction);
   glm::vec3 color = slab.color * opacityOf(opticalDepth);
-  if (inputs.settings.shading.on && opticalDepth > 0.0F) color *= ray.lightOn(ray.middleOf(k), block);
+  if (inputs.settings.shading.on && opticalDepth > 0.0F) color *= ray.lightOn(middle, block);
   return {color, opticalDepth};
+}
+
+Material slabMaterial(const RayInputs& inputs, const SampledRay& ray, std::uint32_t k, const Block& block,
+                      float length) {
+  return materialBetween(inputs, ray, block, ray.beginOf(k), ray.endOf(k), ray.middleOf(k), length);
+}
+
+/// A sample of nearest values: the faces between voxels cut it into parts, each of one scalar.
+Material nearestMaterial(const RayInputs& inputs, const SampledRay& ray, std::uint32_t k, const Block& block,
+                         float length) {
+  Material sum;
+  float from = 0.0F;
+  for (const float to : ray.facesIn(k, block)) {
+    const float middle = glm::mix(ray.beginOf(k), ray.endOf(k), 0.5F * (from + to));
+    const Material part = materialBetween(inputs, ray, block, middle, middle, middle, (to - from) * length);
+    sum.color += (1.0F - opacityOf(sum.opticalDepth)) * part.color;
+    sum.opticalDepth = std::min(sum.opticalDepth + part.opticalDepth, maxExtinction);
+    from = to;
+  }
+  return sum;
 }
 
 Material isosurfaceMaterial(const RayInputs& inputs, const SampledRay& ray, std::uint32_t k,
@@ -260,6 +294,8 @@ std::vector<Interval> castRay(const RayInputs& inputs, std::span<const Block> bl
                               std::uint32_t atOnce) {
   const SampledRay ray(inputs, blocks, x, y);
   const float enough = terminationOpticalDepth(inputs.settings);
+  const auto volumeMaterial =
+      inputs.settings.interpolation == Interpolation::Nearest ? nearestMaterial : slabMaterial;
   const bool isosurfaces = inputs.settings.blending.mode == BlendMode::Isosurface;
   std::vector<Interval> samples;
   float total = 0.0F;
@@ -269,7 +305,7 @@ std::vector<Interval> castRay(const RayInputs& inputs, std::span<const Block> bl
       const float front = ray.frontOf(k);
       const float back = ray.backOf(std::min(k + atOnce, ray.inScene().last));
       const Material material = isosurfaces ? isosurfaceMaterial(inputs, ray, k, *owned.block)
-                                            : slabMaterial(inputs, ray, k, *owned.block, back - front);
+                                            : volumeMaterial(inputs, ray, k, *owned.block, back - front);
       const glm::vec3& color = material.color;
       samples.push_back({front, back, color.r, color.g, color.b, material.opticalDepth});
       total += material.opticalDepth;

@@ -227,6 +227,7 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, const std::string&
                          ? vdi::Block::fromCells(counts, origin, spacing, vdi::ScalarType::U8, first)
                          : vdi::Block::fromPoints(counts, origin, spacing, vdi::ScalarType::U8, first);
   block.moveValues(memory.offset);
+  block.nearest = choice.nearest;
   const bool isOne = memory.values.components == 1;
   vdi::showComponent(block, memory.values, isOne ? vdi::magnitude : choice.component);
   // The deleter's copy of the smart pointer keeps the array alive.

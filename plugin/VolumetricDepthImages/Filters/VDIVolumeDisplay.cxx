@@ -224,6 +224,14 @@ void takeBlending(vtkSMProxy* filter, vtkSMProxy* shown) {
   if (mode) vtkSMPropertyHelper(filter, "BlendMode").Set(static_cast<int>(*mode));
 }
 
+void takeInterpolation(vtkSMProxy* filter, vtkSMProxy* shown) {
+  if (!isVolume(shown) || shown->GetProperty("InterpolationType") == nullptr) return;
+  if (!areUnset(filter, {"InterpolationType"})) return;
+  // The filter has VTK's numbers.
+  vtkSMPropertyHelper(filter, "InterpolationType")
+      .Set(vtkSMPropertyHelper(shown, "InterpolationType").GetAsInt());
+}
+
 std::string displayIssues(vtkSMProxy* shown) {
   if (!isVolume(shown)) return {};
   std::string issues = blendModeIssue(shown);

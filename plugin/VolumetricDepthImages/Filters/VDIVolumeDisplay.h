@@ -35,6 +35,9 @@ void takeCropping(vtkSMProxy* filter, vtkSMProxy* shown, const vdi::Box& whole);
 /// has.
 void takeBlending(vtkSMProxy* filter, vtkSMProxy* shown);
 
+/// Sets InterpolationType of `filter` to that of the volume that `shown` shows.
+void takeInterpolation(vtkSMProxy* filter, vtkSMProxy* shown);
+
 /// The message for a user whose view shows the volume by properties that the filter lacks: its blend mode,
 /// another array's opacity, a 2-D transfer function, another place. Empty if the filter shows what the view
 /// shows.

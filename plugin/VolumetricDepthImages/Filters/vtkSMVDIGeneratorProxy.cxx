@@ -315,6 +315,7 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
     pv::takeCropping(this, shown,
                      this->OfRanks ? this->OfRanks->Whole : pv::wholeToCrop(this->InputInformation()));
     pv::takeBlending(this, shown);
+    pv::takeInterpolation(this, shown);
     if (const std::string issues = pv::displayIssues(shown); !issues.empty()) vtkWarningMacro(<< issues);
   }
   if (!hasCamera && pv::isPlaced(view)) SetCamera(this, view);

@@ -82,7 +82,7 @@ bool vtkVDIGenerator::IsRoot() const {
 }
 
 double* vtkVDIGenerator::GetLastVdi() {
-  static_assert(std::tuple_size_v<pv::LastVdiNumbers> == 17, "the header's size hint is another number");
+  static_assert(std::tuple_size_v<pv::LastVdiNumbers> == 18, "the header's size hint is another number");
   return this->Internal->Last.data();
 }
 
@@ -364,7 +364,10 @@ void vtkVDIGenerator::AnnounceRange(const char* array, int components, int compo
 }
 
 pv::Origin vtkVDIGenerator::OriginOf(vtkDataObject* input) {
-  return pv::originOf(input, this, this->Component, this->FillGhosts);
+  pv::Origin origin = pv::originOf(input, this, this->Component, this->FillGhosts);
+  origin.choice.nearest = this->Settings[vdi::indexOfSetting("InterpolationType")] ==
+                          static_cast<double>(vdi::Interpolation::Nearest);
+  return origin;
 }
 
 /// Shows the input in the volume. The filter must have its turn. Uploads nothing if another filter has done
@@ -380,6 +383,7 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const pv::Origin& origin)
         {std::hash<std::string>()(origin.choice.name), "SelectInputScalars, the array"},
         {origin.choice.cells ? 1U : 0U, "SelectInputScalars, of points or of cells"},
         {static_cast<std::uint64_t>(std::int64_t{this->Component}), "Component"},
+        {origin.choice.nearest ? 1U : 0U, "InterpolationType"},
         {this->FillGhosts ? 1U : 0U, "FillGhosts"},
         {this->PictureOnly ? 1U : 0U, "PictureOnly"},
         {static_cast<std::uint64_t>(this->BlendMode), "BlendMode"}};

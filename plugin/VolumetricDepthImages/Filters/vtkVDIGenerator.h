@@ -43,7 +43,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkVDIProperties 
   const char* GetReport() const { return this->Report.c_str(); }
   /// The last VDI's properties and costs, as pv::numbersOf gives them; all 0 without one, and on ranks other
   /// than 0.
-  double* GetLastVdi() VTK_SIZEHINT(17);
+  double* GetLastVdi() VTK_SIZEHINT(18);
 
   /// Gives the output the range of another component of its array, ahead of the VDI that will show it.
   /// ParaView fits a map to the output's range as soon as a user has chosen a component.

@@ -55,13 +55,14 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIProperties : public vtkImageAlgorith
   vtkSetVector2Macro(Resolution, int);
   ///@{
   /**
-   * The settings of vdi/core/SettingsTable.h, which has their ranges and defaults. Algorithm, Budget and
-   * Precision are the enumerators of vdi::Algorithm, vdi::Budget and vdi::Precision. With a value out of
-   * range, the next update fails.
+   * The settings of vdi/core/SettingsTable.h, which has their ranges and defaults. Interpolation
+   * Type, Algorithm, Budget and Precision are the enumerators of vdi::Interpolation, vdi::Algorithm,
+   * vdi::Budget and vdi::Precision. With a value out of range, the next update fails.
    */
   void SetMargin(double share) { this->SetSetting("Margin", share); }
   void SetSupersegments(int most) { this->SetSetting("Supersegments", most); }
   void SetSamplingRate(double samples) { this->SetSetting("SamplingRate", samples); }
+  void SetInterpolationType(int type) { this->SetSetting("InterpolationType", type); }
   void SetAlgorithm(int algorithm) { this->SetSetting("Algorithm", algorithm); }
   void SetBudget(int budget) { this->SetSetting("Budget", budget); }
   void SetFill(double share) { this->SetSetting("Fill", share); }
