@@ -67,9 +67,10 @@ export function toView(world, camera, basis) {
  * @param {Camera} camera
  * @param {number} height of the picture, in pixels
  * @param {Camera} original V_O
+ * @param {[number, number]} [middle] pixel that shows the focal point, right of and above the picture's middle
  * @returns {Rays}
  */
-export function raysOf(camera, height, original) {
+export function raysOf(camera, height, original, middle = [0, 0]) {
   const from = basisOf(original);
   const basis = basisOf(camera);
   const turned = (/** @type {Vec3} */ v) =>
@@ -77,13 +78,14 @@ export function raysOf(camera, height, original) {
   const pixel = 2 * halfHeightOf(camera) / height;
   const right = turned(times(pixel, basis.right));
   const up = turned(times(pixel, basis.up));
+  const shift = plus(times(-middle[0], right), times(-middle[1], up));
   const origin = toView(camera.position, original, from);
   const direction = turned(basis.forward);
   /** @type {Vec3} */
   const none = [0, 0, 0];
   return camera.parallel
-    ? {origin, originRight: right, originUp: up, direction, directionRight: none, directionUp: none}
-    : {origin, originRight: none, originUp: none, direction, directionRight: right, directionUp: up};
+    ? {origin: plus(origin, shift), originRight: right, originUp: up, direction, directionRight: none, directionUp: none}
+    : {origin, originRight: none, originUp: none, direction: plus(direction, shift), directionRight: right, directionUp: up};
 }
 
 /**
@@ -99,9 +101,10 @@ export function pixelSizeOf(header) {
  * resolve depth. Far from the origin, single precision wouldn't resolve a pixel in world coordinates.
  * @param {Camera} camera
  * @param {[number, number]} extent half the canvas' width and height, in the camera's half heights
+ * @param {[number, number]} [middle] place of the focal point in clip space
  * @returns {Float32Array} 16 numbers, by columns
  */
-export function clipMatrix(camera, extent) {
+export function clipMatrix(camera, extent, middle = [0, 0]) {
   const {right, up, forward} = basisOf(camera);
   const half = halfHeightOf(camera);
   const rows = [times(1 / (half * extent[0]), right), times(1 / (half * extent[1]), up)];
@@ -114,6 +117,8 @@ export function clipMatrix(camera, extent) {
   } else {
     for (let column = 0; column < 3; ++column) matrix[4 * column + 3] = forward[column];
   }
+  for (let column = 0; column < 4; ++column)
+    for (const row of [0, 1]) matrix[4 * column + row] += middle[row] * matrix[4 * column + 3];
   return matrix;
 }
 

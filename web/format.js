@@ -62,7 +62,7 @@ export class FormatError extends Error {}
  */
 /** @typedef {Header & Lists} Vdi */
 
-const HEADER_BYTES = 240;
+export const HEADER_BYTES = 240;
 const ENTRY_BYTES = 16;
 const MAX_SIDE = 32768;
 const MAX_CODE = 16383;
@@ -129,12 +129,15 @@ function requireSizes(header, fileBytes) {
 }
 
 /**
- * Tells whether these are rows of `length` numbers each.
+ * Tells whether these are the nodes of a function: rows of a position and of `length - 1` shares, in
+ * ascending order.
  * @param {unknown} rows @param {number} length
  */
-function areRows(rows, length) {
-  return Array.isArray(rows) &&
-         rows.every((row) => Array.isArray(row) && row.length === length && row.every(Number.isFinite));
+function areNodes(rows, length) {
+  const isShare = (/** @type {number} */ value) => value >= 0 && value <= 1;
+  return Array.isArray(rows) && rows.length > 0 && rows.every((row, i) =>
+    Array.isArray(row) && row.length === length && row.every(Number.isFinite) && row.slice(1).every(isShare) &&
+    (i === 0 || rows[i - 1][0] <= row[0]));
 }
 
 /**
@@ -149,7 +152,8 @@ function coloringOf(json) {
     fail("its metadata don't describe the array");
   if (range !== undefined && !(Array.isArray(range) && range.length === 2 && range.every(Number.isFinite)))
     fail("the range in its metadata isn't two numbers");
-  if (!areRows(map?.colors, 4) || !areRows(map?.opacities, 2) || !(map.unitDistance > 0))
+  if (range !== undefined && range[0] > range[1]) fail("the range in its metadata doesn't ascend");
+  if (!areNodes(map?.colors, 4) || !areNodes(map?.opacities, 2) || !(map.unitDistance > 0 && map.unitDistance < Infinity))
     fail("its metadata don't describe the transfer function");
   return {array, range, transferFunction: map};
 }
@@ -173,13 +177,14 @@ function decodeMetadata(bytes, view, at) {
 }
 
 /**
- * Reads the header. It checks version and encoding before the checksum, so that the message for a
- * file of a later version names the version.
- * @param {Uint8Array} bytes the whole file
+ * Reads the header without the metadata. It checks version and encoding before the checksum, so that
+ * the message for a file of a later version names the version.
+ * @param {Uint8Array} bytes at least the file's first HEADER_BYTES, if it has them
+ * @param {number} fileBytes
  * @returns {Header}
  */
-export function decodeHeader(bytes) {
-  if (bytes.length < HEADER_BYTES) fail(`${bytes.length} bytes are too few for a header`);
+export function startOf(bytes, fileBytes) {
+  if (bytes.length < HEADER_BYTES) fail(`${fileBytes} bytes are too few for a header`);
   const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
   const word = (/** @type {number} */ at) => view.getUint32(at, true);
   if (String.fromCharCode(...bytes.subarray(0, 8)) !== "VDI-FILE") fail("it doesn't start with VDI-FILE");
@@ -218,12 +223,23 @@ export function decodeHeader(bytes) {
       parallel: (flags & 1) !== 0,
     },
   };
-  requireSizes(header, bytes.length);
-  if (!checksumHolds(bytes.subarray(HEADER_BYTES, HEADER_BYTES + header.chunkCount * ENTRY_BYTES), view, 224))
-    fail("the chunk table's checksum is wrong");
+  requireSizes(header, fileBytes);
   if (!Number.isFinite(header.time) || header.bounds.flat().some(Number.isNaN)) fail("its time or bounds aren't numbers");
   requireCamera(header.camera);
-  if (version === METADATA_VERSION) {
+  return header;
+}
+
+/**
+ * Reads the header and the metadata.
+ * @param {Uint8Array} bytes the whole file
+ * @returns {Header}
+ */
+export function decodeHeader(bytes) {
+  const header = startOf(bytes, bytes.length);
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
+  if (!checksumHolds(bytes.subarray(HEADER_BYTES, HEADER_BYTES + header.chunkCount * ENTRY_BYTES), view, 224))
+    fail("the chunk table's checksum is wrong");
+  if (header.version === METADATA_VERSION) {
     const behind = HEADER_BYTES + header.chunkCount * ENTRY_BYTES + header.dataBytes;
     header.coloring = decodeMetadata(bytes, view, behind);
   }
@@ -396,13 +412,15 @@ function takeCode(plain, chunk, vdi) {
 /**
  * Decodes a whole file.
  * @param {Uint8Array} bytes
+ * @param {(header: Header) => void} [accept] called before memory is allocated; it may throw
  * @param {() => Promise<void> | undefined} [pause] the decoder calls it between chunks, and awaits
  *     the promise if it returns one. It may throw to stop the decoder.
  * @returns {Promise<Vdi>}
  */
-export async function decodeVdi(bytes, pause = () => undefined) {
+export async function decodeVdi(bytes, accept = () => {}, pause = () => undefined) {
   const header = decodeHeader(bytes);
   const chunks = chunksOf(bytes, header);
+  accept(header);
   /** @type {Vdi} */
   const vdi = {
     ...header,

@@ -60,6 +60,15 @@ export function tilingOf(gl) {
   return {rowShift: shift, layerShift: shift};
 }
 
+/**
+ * The number of elements that a texture of makeArrayTexture holds.
+ * @param {WebGL2RenderingContext} gl
+ */
+export function mostElements(gl) {
+  const {rowShift, layerShift} = tilingOf(gl);
+  return gl.isContextLost() ? Infinity : 2 ** (rowShift + layerShift) * gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS);
+}
+
 const UPLOAD_BYTES = 2 << 20;  // bytes of one upload
 
 /**

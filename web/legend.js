@@ -108,6 +108,5 @@ export function showLegend(figure, coloring) {
   const scale = part("scale");
   scale.style.minWidth = `calc(28px + ${widest}ch)`;
   scale.append(bar, ...ticks);
-  figure.title = coloring.range ? `Values from ${rangeText(...coloring.range)}` : "";
   figure.replaceChildren(caption, scale);
 }

@@ -61,6 +61,12 @@ function isGone(live) {
   return live.hasEnded && (live.state === "lost" || live.state === "connecting");
 }
 
+/** @param {number} received bytes @param {number} bytes of all */
+function arrivedText(received, bytes) {
+  const [unit, name, digits] = bytes < 1e6 ? [1e3, "kB", 0] : [1e6, "MB", 1];
+  return `${(received / unit).toFixed(digits)} of ${(bytes / unit).toFixed(digits)} ${name}`;
+}
+
 /**
  * The state of a connection in one line.
  * @param {Live} live
@@ -85,6 +91,8 @@ export function liveText(live, now) {
     if (!isSeries && live.wanted === null) parts.push(ageText((now - shown.madeAt) / 1000));
     if (shown.levels > 1) parts.push(shown.level + 1 < shown.levels ? `level ${shown.level + 1} of ${shown.levels}` : "full");
   }
+  const {level, received} = live.assembler;
+  if (isOn && level && (!shown || (live.wanted ?? shown.frame) !== shown.frame)) parts.push(arrivedText(received, level.bytes));
   if (isOn && shown) parts.push(`${(live.rate() / 1048576).toFixed(1)} MiB/s`);
   if (isOn && shown && shown.dropped > 0 && !isSeries) parts.push(`${shown.dropped} dropped`);
   return parts.join(" · ");
@@ -200,15 +208,11 @@ export class LivePanel {
   }
 
   onChange() {
-    const {live} = this;
-    const {state} = live;
     for (const listener of [...this.listeners]) listener();
     const hasSeries = this.count() > 0;
     if (hasSeries || this.hadSeries) this.view.onSeries(this.index());
     this.hadSeries = hasSeries;
     this.view.onChange();
-    // A final failure covers the picture with its message. Attempts to reconnect leave it visible.
-    this.say(state === "refused" ? live.cause : live.shown || state === "closed" ? "" : liveText(live, performance.now()));
     this.refresh();
   }
 
@@ -220,6 +224,9 @@ export class LivePanel {
 
   refresh() {
     const {live} = this;
+    const {state} = live;
+    // A final failure covers the picture with its message. Attempts to reconnect leave it visible.
+    this.say(state === "refused" ? live.cause : live.shown || state === "closed" ? "" : liveText(live, performance.now()));
     byId("live").dataset.state = live.isPaused && live.state === "live" ? "paused" : isGone(live) ? "ended" : live.state;
     byId("livetext").textContent = liveText(live, performance.now());
     byId("pause").textContent = this.label();

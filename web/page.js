@@ -1,10 +1,11 @@
 // The page. It connects viewer, controls and sources of frames.
 
 import {drawAxes} from "./axes.js";
-import {between, cameraOfText, cameraText, centerOf, degreesBetween} from "./camera.js";
+import {basisOf, between, cameraOfText, cameraText, centerOf, degreesBetween, halfHeightOf, toView} from "./camera.js";
 import {addControls} from "./controls.js";
 import {Decoder, serveDecoding} from "./decoder.js";
-import {showLegend} from "./legend.js";
+import {mostElements} from "./gl.js";
+import {rangeText, showLegend} from "./legend.js";
 import {LivePanel, takeToken} from "./livepanel.js";
 import {SteerPanel} from "./steerpanel.js";
 import {embeddedSource, filesSource} from "./sources.js";
@@ -53,13 +54,40 @@ function fragment() {
   return new URLSearchParams(location.hash.slice(1));
 }
 
+/** Panels that a picture is framed beside. */
+const PANELS = ["bar", "legend", "header"];
+const LEAST_FRAME = [64, 48];  // CSS pixels; in a smaller one nothing can be seen
+
+/**
+ * The box around the scene in a picture of its VDI's own view, in multiples of the picture's height
+ * right of and above its middle: left, lower, right and upper end. It isn't finite if the camera is in
+ * the scene.
+ * @param {PreparedVdi} vdi
+ */
+function sceneBox({bounds, camera}) {
+  const basis = basisOf(camera), half = halfHeightOf(camera);
+  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((corner) => {
+    const [right, up, depth] = toView(/** @type {Vec3} */ ([0, 1, 2].map((axis) => bounds[(corner >> axis) & 1][axis])), camera, basis);
+    const scale = camera.parallel ? 2 * half : depth > 0 ? 2 * half * depth : 0;
+    return [right / scale, up / scale];
+  });
+  const [x, y] = [0, 1].map((axis) => corners.map((corner) => corner[axis]));
+  return [Math.min(...x), Math.min(...y), Math.max(...x), Math.max(...y)];
+}
+
 export class Page {
   constructor() {
     this.darkScheme = window.matchMedia("(prefers-color-scheme: dark)");
     this.decoder = new Decoder(document.querySelector("script[type=module]")?.textContent ?? "");
-    this.viewer = new Viewer(/** @type {HTMLCanvasElement} */ (element("view")), tell, (vdi) => this.decoder.lean(vdi));
+    this.viewer = new Viewer(/** @type {HTMLCanvasElement} */ (element("view").querySelector("canvas")), tell, (vdi) => this.decoder.lean(vdi));
+    this.decoder.room.elements = mostElements(this.viewer.renderer.gl);
     /** @type {Source | undefined} */
     this.source = undefined;
+    /**
+     * The source of which a frame is on show, while another one may be opening.
+     * @type {Source | undefined}
+     */
+    this.shownSource = undefined;
     /** @type {LivePanel | undefined} */
     this.live = undefined;
     /** @type {SteerPanel | undefined} */
@@ -79,6 +107,7 @@ export class Page {
     this.notice = "";
     /** @type {Camera | undefined} the latest camera of an unfinished motion to the VDI's viewpoint */
     this.homeward = undefined;
+    this.viewer.frameOf = () => this.framing();
     this.viewer.onRest = () => {
       this.keepInUrl();
       this.steer?.onRest();
@@ -105,6 +134,7 @@ export class Page {
       viewer.refresh();
     });
     input("triad").addEventListener("change", () => this.showView());
+    input("scale").addEventListener("change", () => this.showScale());
     input("smooth").addEventListener("change", () => viewer.setSmooth(input("smooth").checked));
     input("background").addEventListener("input", () => {
       this.ownBackground = true;
@@ -128,6 +158,10 @@ export class Page {
       });
     }
     window.addEventListener("resize", () => viewer.redraw());
+    const panelSizes = new ResizeObserver(() => viewer.schedule());
+    for (const panel of PANELS) panelSizes.observe(element(panel));
+    for (const name of ["focus", "pointerdown", "keydown"]) window.addEventListener(name, () => viewer.takeContext(), true);
+    document.addEventListener("visibilitychange", () => document.hidden || viewer.takeContext());
     window.addEventListener("hashchange", () => this.onNewUrl());
     this.darkScheme.addEventListener("change", () => this.takeTheme());
     document.addEventListener("dragover", (event) => event.preventDefault());
@@ -135,6 +169,38 @@ export class Page {
       event.preventDefault();
       this.openFiles([...(event.dataTransfer?.files ?? [])]);
     });
+  }
+
+  /**
+   * The part of the view in which the picture is framed, in CSS pixels from its lower left corner:
+   * above the bar, and beside the legend and below the header where they would cover the scene.
+   * @returns {import("./renderer.js").Frame | undefined} undefined: the whole view
+   */
+  framing() {
+    const {vdi} = this;
+    if (!vdi) return undefined;
+    const {width, height} = element("view").getBoundingClientRect();
+    const boxes = PANELS.map((id) => element(id).getBoundingClientRect());
+    const [bar, legend, header] = boxes.map((box) => box.width > 0 && box.height > 0 ? box : undefined);
+    const bottom = bar ? height - bar.top : 0, right = legend ? width - legend.left : 0, top = header ? header.bottom : 0;
+    const frames = [[0, 0], [0, right], [top, 0], [top, right]]
+      .map(([above, beside]) => ({x: 0, y: bottom, width: width - beside, height: height - above - bottom}))
+      .filter((frame) => frame.width >= LEAST_FRAME[0] && frame.height >= LEAST_FRAME[1]);
+    const [pictureWidth, pictureHeight] = [vdi.width - 2 * vdi.margin[0], vdi.height - 2 * vdi.margin[1]];
+    const scene = sceneBox(vdi);
+    const isFree = (/** @type {import("./renderer.js").Frame} */ frame) => {
+      const framed = Math.min(frame.height, frame.width * pictureHeight / pictureWidth);
+      const [x, y] = [frame.x + frame.width / 2, height - frame.y - frame.height / 2];
+      const [left, upper, end, lower] = [x + scene[0] * framed, y - scene[3] * framed, x + scene[2] * framed, y - scene[1] * framed];
+      return [bar, legend, header].every((box) =>
+        !box || end <= box.left || left >= box.right || lower <= box.top || upper >= box.bottom);
+    };
+    return frames.find(isFree) ?? frames[1] ?? frames[0];
+  }
+
+  /** Shows the colour bar of the VDI on show, unless the user hides it. */
+  showScale() {
+    showLegend(element("legend"), input("scale").checked ? this.vdi?.coloring : undefined);
   }
 
   /** @param {KeyboardEvent} event */
@@ -193,12 +259,15 @@ export class Page {
     this.play(false);
     const wanted = Number(fragment().get("frame") ?? 0);
     const first = this.source === undefined && wanted > 0 && wanted < source.count ? Math.floor(wanted) : 0;
-    const before = this.source;
     this.source = source;
+    tell(`Reading ${source.nameOf(first)}…`);
     if (await this.show(first) !== "shown") {
-      if (this.source === source) this.source = before;
+      if (this.source === source) this.source = this.shownSource;
       return;
     }
+    const before = this.shownSource;
+    this.shownSource = source;
+    if (before || this.live) document.title = source.nameOf(first);
     this.live?.close();
     this.showSeries(first);
     if (before === undefined) this.takeUrl();
@@ -247,7 +316,7 @@ export class Page {
     do {
       while (this.opening) await this.opening;  // if no file is sound, the server's frames continue
       if (live?.live.state === "closed") return false;
-      this.source = undefined;
+      this.source = this.shownSource = undefined;
       isShown = await viewer.setVdi(vdi, isWanted);
     } while (!isShown && this.opening);
     if (!isShown) return false;
@@ -258,7 +327,7 @@ export class Page {
     if (!viewer.isLost && this.notice === "") tell("");
     this.follow(before);
     this.showFacts([]);
-    showLegend(element("legend"), vdi.coloring);
+    this.showScale();
     this.showView();
     return true;
   }
@@ -284,8 +353,7 @@ export class Page {
     const request = ++this.request;
     const isWanted = () => request === this.request && source === this.source;
     try {
-      if (!this.vdi) tell("Reading…");
-      const vdi = await source.load(frame);
+      const vdi = await source.load(frame, isWanted);
       if (!isWanted() || !await viewer.setVdi(vdi, isWanted)) return "failed";
       const before = this.vdi;
       this.vdi = vdi;
@@ -295,7 +363,7 @@ export class Page {
       const hasTime = vdi.timeStep !== 0 || vdi.time !== 0;
       this.showFacts([source.nameOf(frame),
                       ...hasTime ? [`step ${vdi.timeStep}`, `t = ${Number(vdi.time.toPrecision(10))}`] : []]);
-      showLegend(element("legend"), vdi.coloring);
+      this.showScale();
       this.showView();
       return "shown";
     } catch (error) {
@@ -339,7 +407,9 @@ export class Page {
     const {vdi} = this;
     if (!vdi) return;
     const [width, height] = [vdi.width - 2 * vdi.margin[0], vdi.height - 2 * vdi.margin[1]];
-    const parts = [...facts, `${width} × ${height}`, `${vdi.supersegmentCount.toLocaleString("en")} supersegments`];
+    const range = vdi.coloring?.range;
+    const parts = [...facts, `${width} × ${height}`, `${vdi.supersegmentCount.toLocaleString("en")} supersegments`,
+                   range ? `values from ${rangeText(...range)}` : ""];
     element("facts").textContent = parts.filter(Boolean).join(" · ");
   }
 

@@ -127,20 +127,36 @@ function makePicture(gl, filter) {
   };
 }
 
+/**
+ * A part of a canvas, in pixels from its lower left corner.
+ * @typedef {{x: number, y: number, width: number, height: number}} Frame
+ */
+
+/** @param {HTMLCanvasElement} canvas */
+function contextOf(canvas) {
+  let cause = "";
+  canvas.addEventListener("webglcontextcreationerror", (event) => {
+    cause ||= /** @type {WebGLContextEvent} */ (event).statusMessage;
+  });
+  const gl = canvas.getContext("webgl2", {alpha: false, antialias: true, powerPreference: "high-performance"});
+  if (!gl) throw new Error(`VDIs can't be shown without WebGL2, which this browser refuses${cause && `: ${cause}`}`);
+  return gl;
+}
+
 export class Renderer {
   /**
    * Throws Error without WebGL2. The owner of the canvas sets its size in pixels, `most` at most.
    * @param {HTMLCanvasElement} canvas
    */
   constructor(canvas) {
-    let cause = "";
-    canvas.addEventListener("webglcontextcreationerror", (event) => {
-      cause ||= /** @type {WebGLContextEvent} */ (event).statusMessage;
-    });
-    const gl = canvas.getContext("webgl2", {alpha: false, antialias: true, powerPreference: "high-performance"});
-    if (!gl) throw new Error(`VDIs can't be shown without WebGL2, which this browser refuses${cause && `: ${cause}`}`);
-    this.gl = gl;
+    this.gl = contextOf(canvas);
     this.canvas = canvas;
+    /**
+     * The part of the canvas in which the camera's extent is framed, in pixels from the lower left
+     * corner; undefined: the whole canvas.
+     * @type {Frame | undefined}
+     */
+    this.framing = undefined;
     /** @type {Loaded | undefined} */
     this.loaded = undefined;
     this.smooth = true;
@@ -148,6 +164,16 @@ export class Renderer {
     this.age = 0;
     /** The largest width and height of the canvas. @type {[number, number]} */
     this.most = [1, 1];
+    this.restore();
+  }
+
+  /**
+   * Goes on with another canvas. Throws Error without WebGL2; then nothing has changed.
+   * @param {HTMLCanvasElement} canvas
+   */
+  moveTo(canvas) {
+    this.gl = contextOf(canvas);
+    this.canvas = canvas;
     this.restore();
   }
 
@@ -183,9 +209,8 @@ export class Renderer {
    * @returns {Promise<boolean>} whether the VDI replaced the former one
    */
   async setVdi(vdi, pause, isWanted) {
-    const {gl} = this;
     for (;;) {
-      const age = this.age;
+      const {gl, age} = this;
       const loaded = texturesOf(gl, vdi);
       for (const upload of loaded.uploads) {
         if (!isWanted()) break;
@@ -303,14 +328,24 @@ export class Renderer {
   }
 
   /**
-   * The number of canvas pixels in the camera's vertical extent. On a canvas that is narrower than
-   * the VDI's picture it is less than the canvas' height, because the whole width stays in view.
+   * The number of canvas pixels in the camera's vertical extent. In a frame that is narrower than
+   * the VDI's picture it is less than the frame's height, because the whole width stays in view.
    */
   framedHeight() {
     const {loaded, canvas} = this;
-    if (!loaded) return canvas.height;
+    const frame = this.framing ?? canvas;
+    if (!loaded) return frame.height;
     const {width, height, margin} = loaded.vdi;
-    return Math.min(canvas.height, canvas.width * (height - 2 * margin[1]) / (width - 2 * margin[0]));
+    return Math.min(frame.height, frame.width * (height - 2 * margin[1]) / (width - 2 * margin[0]));
+  }
+
+  /**
+   * The middle of what the camera frames, in pixels right of and above the canvas' middle.
+   * @returns {[number, number]}
+   */
+  framedMiddle() {
+    const {framing: frame, canvas} = this;
+    return frame ? [frame.x + (frame.width - canvas.width) / 2, frame.y + (frame.height - canvas.height) / 2] : [0, 0];
   }
 
   /**
@@ -338,7 +373,7 @@ export class Renderer {
       gl.uniform1i(uniform(name), units[i]);
     });
     const {width, height} = this.pictureSize(scale);
-    const rays = raysOf(camera, this.framedHeight(), vdi.camera);
+    const rays = raysOf(camera, this.framedHeight(), vdi.camera, this.framedMiddle());
     gl.uniform2i(uniform("lists"), vdi.width, vdi.height);
     gl.uniform1i(uniform("parallel"), vdi.camera.parallel ? 1 : 0);
     gl.uniform1f(uniform("pixelSize"), pixelSizeOf(vdi));
@@ -402,7 +437,9 @@ export class Renderer {
     gl.enableVertexAttribArray(attribute);
     gl.vertexAttribPointer(attribute, 3, gl.FLOAT, false, 0, 0);
     const framed = this.framedHeight();
-    const clip = clipMatrix(camera, [canvas.width / framed, canvas.height / framed]);
+    const [right, up] = this.framedMiddle();
+    const clip = clipMatrix(camera, [canvas.width / framed, canvas.height / framed],
+                            [2 * right / canvas.width, 2 * up / canvas.height]);
     gl.uniformMatrix4fv(lines.uniform("clip"), false, clip);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);

@@ -2,6 +2,8 @@
 // request. Frames may be inside the page (`embeddedSource`), or files that the user opened or
 // dropped (`filesSource`). A server sends frames on its own; see live.js.
 
+import {HEADER_BYTES} from "./format.js";
+
 /** @typedef {import("./decoder.js").Decoder} Decoder */
 /** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
 
@@ -9,12 +11,13 @@
  * @typedef {object} Source
  * @property {number} count number of frames
  * @property {(frame: number) => string} nameOf
- * @property {(frame: number) => Promise<PreparedVdi>} load throws Error with one line for the user
+ * @property {(frame: number, isWanted: () => boolean) => Promise<PreparedVdi>} load throws Error with one line
+ *     for the user; may give up a frame that isn't wanted any more
  */
 
 /**
  * Caches the latest decoded frames that fit into `mostBytes`.
- * @param {(frame: number) => Promise<PreparedVdi>} load
+ * @param {Source["load"]} load
  * @param {number} mostBytes
  */
 function keepingSome(load, mostBytes) {
@@ -23,8 +26,8 @@ function keepingSome(load, mostBytes) {
   const bytesOf = (/** @type {PreparedVdi} */ vdi) =>
     vdi.segments.byteLength + vdi.heads.byteLength +
     (vdi.leaning ? vdi.leaning.slopes.byteLength + vdi.leaning.heads.byteLength : 0);
-  return async (/** @type {number} */ frame) => {
-    const vdi = kept.get(frame) ?? await load(frame);
+  return async (/** @type {number} */ frame, /** @type {() => boolean} */ isWanted) => {
+    const vdi = kept.get(frame) ?? await load(frame, isWanted);
     kept.delete(frame);
     kept.set(frame, vdi);
     let total = 0;
@@ -49,8 +52,8 @@ export function embeddedSource(elements, decoder) {
   return {
     count: elements.length,
     nameOf: (frame) => elements[frame].dataset.name ?? "",
-    load: keepingSome((frame) => decoder.decode({packed: elements[frame].textContent ?? "",
-                                                 size: Number(elements[frame].dataset.size)}), MOST_BYTES),
+    load: keepingSome((frame, isWanted) => decoder.decode({packed: elements[frame].textContent ?? "",
+                                                           size: Number(elements[frame].dataset.size)}, isWanted), MOST_BYTES),
   };
 }
 
@@ -66,6 +69,12 @@ export function filesSource(files, decoder) {
   return {
     count: sorted.length,
     nameOf: (frame) => sorted[frame].name,
-    load: keepingSome(async (frame) => decoder.decode({file: new Uint8Array(await sorted[frame].arrayBuffer())}), MOST_BYTES),
+    load: keepingSome(async (frame, isWanted) => {
+      const file = sorted[frame];
+      decoder.requireFits(new Uint8Array(await file.slice(0, HEADER_BYTES).arrayBuffer()), file.size);
+      const bytes = new Uint8Array(await file.arrayBuffer());
+      if (!isWanted()) throw new Error("another file is wanted by now");
+      return decoder.decode({file: bytes}, isWanted);
+    }, MOST_BYTES),
   };
 }

@@ -10,6 +10,7 @@ import {Renderer} from "./renderer.js";
 /** @typedef {import("./format.js").Camera} Camera */
 /** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
 /** @typedef {import("./renderer.js").Color} Color */
+/** @typedef {import("./renderer.js").Frame} Frame */
 /** @typedef {import("./slopes.js").Leaning} Leaning */
 
 const FRAME_MS = 33;       // time for a picture in motion
@@ -19,6 +20,7 @@ const LEAN_MS = 300;       // a VDI on show for this time is worth a sheared pic
 const LATE_MS = 400;       // at rest, a VDI waits for this time at most until its picture replaces the former one
 const PACE_SHARE = 0.6;    // share of a VDI's time on show in which its first picture at rest is drawn
 const LARGEST_SCALE = 8;
+const RECOVERY_MS = 1000;  // a driver that can recover needs less
 
 export class Viewer {
   /**
@@ -73,26 +75,62 @@ export class Viewer {
     this.onRest = () => {};
     /** @type {ReturnType<typeof setTimeout> | undefined} */
     this.restTimer = undefined;
+    /**
+     * Gives the part of the canvas in which the camera's extent is framed, in CSS pixels from its
+     * lower left corner; undefined: the whole canvas.
+     * @type {() => Frame | undefined}
+     */
+    this.frameOf = () => undefined;
+    this.lostAt = 0;
     this.watchDriver();
   }
 
-  /** Tells users when the graphics driver loses the picture, and draws it again when the driver recovers. */
+  /**
+   * Tells users when the graphics driver loses the picture, and draws it again when the driver
+   * recovers. A browser also takes the context of a page from it when others open too many, and may
+   * never give it back; see takeContext.
+   */
   watchDriver() {
-    this.canvas.addEventListener("webglcontextlost", (event) => {
+    const {canvas} = this;
+    canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault();
+      if (canvas !== this.canvas) return;
       this.isLost = true;
+      this.lostAt = performance.now();
       this.pending = undefined;
-      this.tell("The graphics driver has lost the picture. It will return when the driver recovers.");
+      this.tellLost();
     });
-    this.canvas.addEventListener("webglcontextrestored", () => {
+    canvas.addEventListener("webglcontextrestored", () => {
+      if (canvas === this.canvas) this.recover(() => this.renderer.restore());
+    });
+  }
+
+  tellLost() {
+    this.tell("The graphics driver has lost the picture. It will return when the driver recovers, or with a click.");
+  }
+
+  /** @param {() => void} restore makes the renderer draw again; may throw */
+  recover(restore) {
+    try {
+      restore();
       this.isLost = false;
-      try {
-        this.renderer.restore();
-        this.tell("");
-      } catch (error) {
-        this.tell(/** @type {Error} */ (error).message);
-      }
-      this.redraw();
+      this.tell("");
+    } catch (error) {
+      this.tell(/** @type {Error} */ (error).message);
+    }
+    this.redraw();
+  }
+
+  /** Replaces a context that was lost for a while by one of a new canvas. Call it when the user turns to the page. */
+  takeContext() {
+    if (!this.isLost || performance.now() - this.lostAt < RECOVERY_MS) return;
+    this.lostAt = performance.now();
+    this.recover(() => {
+      const canvas = document.createElement("canvas");
+      this.renderer.moveTo(canvas);
+      this.canvas.replaceWith(canvas);
+      this.canvas = canvas;
+      this.watchDriver();
     });
   }
 
@@ -165,9 +203,9 @@ export class Viewer {
   }
 
   /**
-   * Gives the canvas the screen's number of pixels, or as many as the GPU allows. The browser
-   * stretches a smaller canvas.
-   * @returns {boolean} whether the number changed
+   * Gives the canvas the screen's number of pixels, or as many as the GPU allows, and frames the
+   * picture anew. The browser stretches a smaller canvas.
+   * @returns {boolean} whether the number or the frame changed
    */
   fitCanvas() {
     const {clientWidth, clientHeight} = this.canvas;
@@ -175,7 +213,11 @@ export class Viewer {
     const ratio = Math.min(window.devicePixelRatio || 1, 2, mostWidth / Math.max(clientWidth, 1), mostHeight / Math.max(clientHeight, 1));
     const width = Math.max(1, Math.round(clientWidth * ratio));
     const height = Math.max(1, Math.round(clientHeight * ratio));
-    if (this.canvas.width === width && this.canvas.height === height) return false;
+    const wanted = this.frameOf();
+    const frame = wanted && {x: wanted.x * ratio, y: wanted.y * ratio, width: wanted.width * ratio, height: wanted.height * ratio};
+    const isSame = JSON.stringify(frame) === JSON.stringify(this.renderer.framing);
+    this.renderer.framing = frame;
+    if (this.canvas.width === width && this.canvas.height === height) return !isSame;
     this.canvas.width = width;
     this.canvas.height = height;
     return true;
@@ -306,6 +348,7 @@ export class Viewer {
 
   /** Whether the picture on show is whole. */
   isWhole() {
+    if (this.fitCanvas()) this.redraw();
     return !this.isLost && this.missing === "nothing" && !this.pending;
   }
 

@@ -1,10 +1,11 @@
 // The page's decoder on sound, damaged and hostile files: it decodes, or throws FormatError. $1:
 // vdi. With VDI_FUZZ_SECONDS=600, it continues with other damage for that time.
-import {execFileSync} from "node:child_process";
-import {mkdtempSync, readFileSync, rmSync} from "node:fs";
+import {execFileSync, spawnSync} from "node:child_process";
+import {mkdtempSync, readFileSync, rmSync, writeFileSync} from "node:fs";
 import {tmpdir} from "node:os";
 import {join} from "node:path";
 
+import {Decoder, roomOfPage} from "../../web/decoder.js";
 import {FormatError, decodeVdi} from "../../web/format.js";
 import {lz4AnnouncedBytes, lz4Expand} from "../../web/lz4.js";
 import {xxh64} from "../../web/xxh64.js";
@@ -147,16 +148,64 @@ function withMetadata(/** @type {Uint8Array} */ file, /** @type {string} */ json
   return bytes;
 }
 
-async function testMetadata(/** @type {Uint8Array} */ file) {
+async function testMetadata(/** @type {Uint8Array} */ whole) {
+  const view = new DataView(whole.buffer);
+  const file = whole.slice(0, 240 + 16 * view.getUint32(40, true) + Number(view.getBigUint64(56, true)));  // without its own
   const sound = withMetadata(file, JSON.stringify(METADATA));
   const {coloring} = await decodeVdi(sound);
   if (coloring?.array.name !== "speed ü" || coloring.transferFunction.colors.length !== 3) fail("metadata");
   await testDamage("metadata", sound);
+  const withMap = (/** @type {object} */ changes) =>
+    JSON.stringify({...METADATA, transferFunction: {...METADATA.transferFunction, ...changes}});
   const bad = ["", "{", "[]", "null", "{}", JSON.stringify({...METADATA, range: [1]}), JSON.stringify({...METADATA, array: 3}),
-               JSON.stringify({...METADATA, transferFunction: {colors: [[1, 2]], opacities: [], unitDistance: 1}})];
-  for (const text of bad) {
-    if (await outcome(withMetadata(file, text)) === "sound") fail(`metadata ${text} are sound`);
+               JSON.stringify({...METADATA, range: [2, 1]}), withMap({colors: [[1, 2]]}), withMap({colors: []}),
+               withMap({opacities: []}), withMap({colors: [[0, 0, 0, 1.001]]}), withMap({colors: [[0, -0.1, 0, 1]]}),
+               withMap({opacities: [[0, 2]]}), withMap({opacities: [[1, 0], [0, 1]]}), withMap({unitDistance: 0}),
+               withMap({}).replace('"unitDistance":1', '"unitDistance":1e999')];
+  for (const text of [...bad, withMap({}), withMap({colors: [[5, 1, 0.5, 0]]})]) {
+    const bytes = withMetadata(file, text);
+    const name = join(folder, "metadata.vdi");
+    writeFileSync(name, bytes);
+    const isSound = spawnSync(vdi, ["info", name]).status === 0;
+    if (isSound === bad.includes(text)) fail(`the tool takes metadata ${text}: ${isSound}`);
+    if ((await outcome(bytes) === "sound") !== isSound) fail(`the page takes metadata ${text} otherwise than the tool`);
   }
+}
+
+/** A VDI that takes too much memory, or more than a texture holds, is refused before memory is allocated. */
+async function testRoom(/** @type {Uint8Array} */ file) {
+  const bytes = file.slice(0, 240);
+  const view = new DataView(bytes.buffer);
+  const decoder = Object.assign(Object.create(Decoder.prototype), {room: roomOfPage()});
+  const refusal = (/** @type {number} */ width, /** @type {number} */ height, /** @type {number} */ supersegments) => {
+    const chunks = Math.ceil(width * height / 4096);
+    [width, height].forEach((side, i) => view.setUint32(24 + 4 * i, side, true));
+    view.setUint32(36, 4096, true);
+    view.setUint32(40, chunks, true);
+    view.setUint32(48, supersegments, true);
+    view.setBigUint64(56, 0n, true);
+    view.setUint32(8, 1, true);
+    const {high, low} = xxh64(bytes.subarray(0, 232));
+    view.setUint32(232, low, true);
+    view.setUint32(236, high, true);
+    try {
+      decoder.requireFits(bytes, 240 + 16 * chunks);
+      return "";
+    } catch (error) {
+      return /** @type {Error} */ (error).message;
+    }
+  };
+  if (refusal(3840, 2160, 40e6) !== "") fail(`a VDI of 4K: ${refusal(3840, 2160, 40e6)}`);
+  if (!refusal(14000, 14000, 0).includes("3.7 GiB")) fail(`many empty lists: ${refusal(14000, 14000, 0)}`);
+  if (!refusal(1920, 1080, 400e6).includes("supersegments, which take 3.0 GiB")) fail(`many supersegments: ${refusal(1920, 1080, 400e6)}`);
+  decoder.room.elements = 1e6;
+  if (!refusal(1920, 1080, 0).includes("a texture of this GPU holds 1,000,000")) fail(`a small GPU: ${refusal(1920, 1080, 0)}`);
+  let asked = 0;
+  const isAsked = await decodeVdi(file, () => {
+    ++asked;
+    throw new Error("too large");
+  }).then(() => false, (error) => error.message === "too large");
+  if (!isAsked || asked !== 1) fail("the decoder doesn't ask whether there is room");
 }
 
 /** Lists of as many supersegments as a run may have: more than fit a byte. */
@@ -180,7 +229,10 @@ for (const [name, more] of Object.entries(kinds)) {
   const bytes = new Uint8Array(readFileSync(file));
   files.push(bytes);
   await testDamage(name, bytes);
-  if (name === "compact" && bytes[8] !== 3) await testMetadata(bytes);
+  if (name === "compact") {
+    await testMetadata(bytes);
+    await testRoom(bytes);
+  }
 }
 await testDeepLists();
 testChecksum();

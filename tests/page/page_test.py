@@ -274,7 +274,7 @@ def test_damage(browser):
         with open(f"{name}.vdi", "wb") as file:
             file.write(data)
         drop_files(browser, f"{name}.vdi")
-        browser.wait("!document.getElementById('message').hidden")
+        browser.wait("!message.hidden && !message.textContent.startsWith('Reading')")
         message = message_of(browser)
         check(message.startswith("invalid .vdi file: ") and "\n" not in message, f"{name}: {message}")
         browser.value("document.getElementById('message').hidden = true")
@@ -502,6 +502,106 @@ def test_first_look(browser):
     browser.size(WIDTH, HEIGHT)
 
 
+def test_framing(browser):
+    """In windows of all sizes, neither the bar nor the colour bar nor the header covers the scene."""
+    cube = "cube.vdi"
+    with open("cube.json", "w", encoding="utf-8") as file:
+        json.dump({"colors": [[0, 0.2, 0.4, 1], [1, 1, 0.3, 0.1]], "opacities": [[0, 1], [1, 1]], "relative": True}, file)
+    vdi("generate", "--field", "mixing", "--size", "16x16x16", "--resolution", "160x90", "--supersegments", "4",
+        "--transfer-function", "cube.json", "-o", cube)
+    open_page(browser, page_of(cube, "parallel.vdi"))
+    whole(browser)
+    for width, height in ((360, 240), (320, 568), (568, 320), (800, 450), (1000, 300)):
+        browser.size(width, height)
+        for frame in (0, 1):
+            browser.value(f"vdiPage.show({frame})")
+            whole(browser)
+            browser.value("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+            final(browser)
+            png = browser.value("vdiPage.viewer.screenshot().then((blob) => new Promise((done) => {"
+                                " const reader = new FileReader(); reader.onload = () => done(reader.result.split(',')[1]);"
+                                " reader.readAsDataURL(blob); }))")
+            picture = images.imread(io.BytesIO(base64.b64decode(png)))[..., :3].astype(int)
+            browser.screenshot(os.path.join(PICTURES, f"framing_{width}_{frame}.png"))
+            rows, columns = np.nonzero(np.abs(picture - picture[-1, -1]).max(axis=2) > 8)
+            check(np.ptp(columns) > 30 and np.ptp(rows) > 30, f"{width} x {height}: the scene can be seen")
+            for panel in ("bar", "legend", "header"):
+                left, top, right, bottom = browser.value(
+                    f"(({{left, top, right, bottom}}) => [left, top, right, bottom])"
+                    f"(document.getElementById('{panel}').getBoundingClientRect())")
+                covered = (columns >= left) & (columns < right) & (rows >= top) & (rows < bottom)
+                check(not covered.any(), f"{width} x {height}, frame {frame}: the {panel} covers {covered.sum()} pixels")
+    # A finger goes through the colour bar, which the user can hide.
+    browser.value("vdiPage.show(0)")
+    legend = browser.value("(({x, y, width, height}) => [x + width / 2, y + height / 2])"
+                           "(document.getElementById('legend').getBoundingClientRect())")
+    check(browser.value(f"document.elementFromPoint({legend[0]}, {legend[1]}).closest('#view') !== null"),
+          "the colour bar takes no input")
+    browser.value("document.getElementById('scale').click()")
+    check(browser.value("document.getElementById('legend').hidden"), "the colour bar can be hidden")
+    browser.value("vdiPage.show(1)")
+    check(browser.value("document.getElementById('legend').hidden"), "it stays hidden")
+    browser.size(WIDTH, HEIGHT)
+
+
+def test_many_contexts(browser):
+    """A browser takes the context of a page when others open too many. The page takes another when the user turns to it."""
+    open_page(browser, "compact.html")
+    whole(browser)
+    bare(browser)
+    camera = azimuth(camera_of(browser), 15)
+    browser.value(f"vdiPage.setCamera({json.dumps(camera)}, false)")
+    browser.value("""(() => {
+      window.others = Array.from({length: 17}, () => document.createElement('canvas').getContext('webgl2'));
+    })()""")
+    browser.wait("vdiPage.viewer.isLost")
+    check("lost" in message_of(browser), f"a lost context is reported: {message_of(browser)}")
+    browser.value("new Promise((done) => setTimeout(done, 1100))")
+    browser.mouse("mousePressed", 90, 50, button="left", buttons=1, clickCount=1)
+    browser.mouse("mouseReleased", 90, 50, button="left", clickCount=1)
+    browser.wait("!vdiPage.viewer.isLost")
+    compare("after a lost context", shown(browser), rendered("compact.vdi", camera))
+    check(message_of(browser) == "", f"the message disappears: {message_of(browser)}")
+    browser.drag((90, 50), (110, 50))
+    check(camera_of(browser)["position"] != camera["position"], "the new canvas can be dragged")
+
+
+def test_opening(browser):
+    """While a second file is read, the page says so. The latest choice wins, also if it is a wrong file."""
+    open_page(browser, "compact.html")
+    whole(browser)
+    browser.value("""(() => {
+      window.said = [];
+      new MutationObserver(() => said.push(message.textContent)).observe(message, {childList: true});
+    })()""")
+    drop_files(browser, "full.vdi")
+    browser.wait("vdiPage.vdi && !vdiPage.vdi.compact")
+    check("Reading full.vdi…" in browser.value("said"), f"what the page says: {browser.value('said')}")
+    check(browser.value("document.title") == "full.vdi", "the tab has the file's name")
+    sources = browser.value("""(async () => {
+      const {source, decoder} = vdiPage, {decode} = decoder;
+      const file = (name, bytes) => new File([bytes], name);
+      decoder.decode = async (encoded, isWanted) => {
+        await new Promise((done) => setTimeout(done, 200));
+        if (!isWanted()) window.isAbandoned = true;
+        return decode.call(decoder, encoded, isWanted);
+      };
+      const bytes = await decodeText();
+      const slow = vdiPage.openFiles([file('slow.vdi', bytes)]);
+      await new Promise((done) => setTimeout(done, 50));
+      await vdiPage.openFiles([file('wrong.vdi', 'wrong')]);
+      const said = message.textContent;
+      await slow;
+      return [vdiPage.source === source, said, message.textContent, window.isAbandoned];
+
+      async function decodeText() {
+        const packed = Uint8Array.from(atob(document.querySelector('.vdi-frame').textContent), (c) => c.charCodeAt(0));
+        return new Response(new Response(packed).body.pipeThrough(new DecompressionStream('deflate-raw'))).arrayBuffer();
+      }
+    })()""")
+    check(sources[0] and sources[1] == sources[2] and "too few" in sources[1] and sources[3], f"the latest choice: {sources}")
+
+
 def test_network(browser):
     """The page requests nothing but itself, and its policy allows nothing else."""
     asked = {event["params"]["request"]["url"] for event in browser.events
@@ -514,4 +614,4 @@ if sys.argv[4:] == ["speed"]:
     run(test_frame_time)
 run(test_pictures, test_culling_perspective, test_culling_parallel, test_small_textures, test_hands,
     test_narrow_window, test_screenshot, test_damage, test_without_webgl, test_series, test_legend, test_looks,
-    test_first_look, test_network)
+    test_first_look, test_framing, test_many_contexts, test_opening, test_network)

@@ -498,9 +498,9 @@ async function testFollowing() {
 /** A wrong file that is dropped onto a server's page. */
 async function testWrongFile() {
   const {page, viewer, message} = pageOf();
-  const drop = (/** @type {string} */ name) => page.openFiles([{name, arrayBuffer: async () => new ArrayBuffer(8)}]);
+  const drop = (/** @type {string} */ name) => page.openFiles([{name, slice: () => new Blob([]), arrayBuffer: async () => new ArrayBuffer(8)}]);
   let isSound = false;
-  page.decoder = {decode: async () => {
+  page.decoder = {requireFits: () => {}, decode: async () => {
     if (!isSound) throw new Error("invalid .vdi file: it is too short");
     return vdiFrom(70);
   }};
