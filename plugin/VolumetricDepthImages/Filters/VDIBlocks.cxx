@@ -7,7 +7,6 @@
 #include <vtkDataArray.h>
 #include <vtkImageData.h>
 #include <vtkMatrix3x3.h>
-#include <vtkOverlappingAMR.h>
 #include <vtkPointData.h>
 #include <vtkSmartPointer.h>
 #include <vtkUnsignedCharArray.h>
@@ -330,8 +329,6 @@ std::vector<std::uint64_t> identityOf(vtkDataObject* data) {
     addIdentity(data, identity);
     return identity;
   }
-  // AMR data's modification time also changes when other levels refine other parts of a level.
-  if (vtkOverlappingAMR::SafeDownCast(data) != nullptr) identity.push_back(data->GetMTime());
   const auto iterator = vtkSmartPointer<vtkCompositeDataIterator>::Take(composite->NewIterator());
   for (iterator->InitTraversal(); !iterator->IsDoneWithTraversal(); iterator->GoToNextItem()) {
     identity.push_back(iterator->GetCurrentFlatIndex());
