@@ -88,13 +88,18 @@ class Inside:
         said = wait_for("end of the script", lambda: self.read("ready"), 100)
         assert said == "ok", said
 
-    def __call__(self, call):
-        """The result of a call."""
+    def start(self, call):
+        """Has a call made. Returns once ParaView has begun with it."""
         if self.read("done") is not None:
             os.remove(self.path("done"))
         with open(self.path("do.new"), "w") as file:
             file.write(call)
         os.replace(self.path("do.new"), self.path("do"))
+        wait_for("begin of " + call, lambda: self.read("do") is None, 60)
+
+    def __call__(self, call):
+        """The result of a call."""
+        self.start(call)
         result = json.loads(wait_for("end of " + call, lambda: self.read("done"), 60))
         assert not str(result).startswith("Traceback"), result
         return result

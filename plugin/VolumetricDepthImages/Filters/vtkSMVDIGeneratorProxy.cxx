@@ -38,6 +38,7 @@
 #include "VDICameras.h"
 #include "VDILastVdi.h"
 #include "VDIMaps.h"
+#include "VDIServer.h"
 #include "VDISession.h"
 #include "VDIVolumeDisplay.h"
 #include "plugin/VolumetricDepthImages/ParaViewVersions.h"
@@ -113,18 +114,18 @@ void vtkSMVDIGeneratorProxy::UpdatePipeline() {
   const bool isForView = this->UpdatesForView;
   // After a view got an earlier output, the proxy counts as updated, and the superclass would do nothing.
   if (!isForView && this->IsOutdated()) this->MarkDirty(this);
-  if (isForView) this->InvokeCommand("BeginView");
+  if (isForView) pv::command(this, "BeginView");
   this->Superclass::UpdatePipeline();
-  if (isForView) this->InvokeCommand("EndView");
+  if (isForView) pv::command(this, "EndView");
 }
 
 void vtkSMVDIGeneratorProxy::UpdatePipeline(double time) {
   if (!EnterUpdate(this)) return;
   this->TakeWhatIsNotSet(time);
   const bool isForView = this->UpdatesForView;
-  if (isForView) this->InvokeCommand("BeginView");
+  if (isForView) pv::command(this, "BeginView");
   this->Superclass::UpdatePipeline(time);
-  if (isForView) this->InvokeCommand("EndView");
+  if (isForView) pv::command(this, "EndView");
 }
 
 void vtkSMVDIGeneratorProxy::UpdateVTKObjects() {
@@ -132,7 +133,8 @@ void vtkSMVDIGeneratorProxy::UpdateVTKObjects() {
   this->WatchMap();
   // Where each rank has a client, only some of their scripts may set this property. The ranks meet in the
   // next update, or when a view is drawn.
-  if (this->Taken && !this->Choosing && RanksWithClients() == nullptr) this->FollowArray();
+  if (this->Taken && !this->Choosing && RanksWithClients() == nullptr && pv::isConnected(this->GetSession()))
+    this->FollowArray();
 }
 
 int vtkSMVDIGeneratorProxy::LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) {
@@ -194,7 +196,7 @@ bool vtkSMVDIGeneratorProxy::MeetRanks(vtkMultiProcessController* ranks, std::op
   const bool isSame = all[Highest] == -all[Lowest];
   // A rank whose script has changed nothing would leave the others waiting in the filter.
   if (!isSame || (all[Changed] != 0.0 && all[Unchanged] != 0.0)) {
-    this->InvokeCommand("Renew");
+    pv::command(this, "Renew");
     this->MarkDirty(this);
   }
   return isSame && (all[New] == 0.0 || this->GatherInput(ranks, now, time));
@@ -459,9 +461,8 @@ std::optional<vdi::VdiEstimate> vtkSMVDIGeneratorProxy::EstimateToCome() {
     settings.height = size[1];
   }
   for (const vdi::Setting& setting : vdi::settingsTable()) setting.put(settings, number(setting.property));
-  this->UpdatePropertyInformation(this->GetProperty("LastVdi"));
   pv::LastVdiNumbers last{};
-  vtkSMPropertyHelper(this, "LastVdi").Get(last.data(), static_cast<unsigned int>(last.size()));
+  vtkSMPropertyHelper(pv::asked(this, "LastVdi")).Get(last.data(), static_cast<unsigned int>(last.size()));
   return vdi::estimateOf(settings, pv::lastVdiOf(last));
 }
 
@@ -479,14 +480,12 @@ void vtkSMVDIGeneratorProxy::PrepareUpstream(vtkSMProxy* proxy, std::optional<do
 }
 
 bool vtkSMVDIGeneratorProxy::IsOutdated() {
-  this->UpdatePropertyInformation(this->GetProperty("Outdated"));
-  return vtkSMPropertyHelper(this, "Outdated").GetAsInt() != 0;
+  return vtkSMPropertyHelper(pv::asked(this, "Outdated")).GetAsInt() != 0;
 }
 
 void vtkSMVDIGeneratorProxy::ReleaseNow() {
-  this->UpdatePropertyInformation(this->GetProperty("Held"));
-  if (vtkSMPropertyHelper(this, "Held").GetAsInt() == 0 && !this->IsOutdated()) return;
-  this->InvokeCommand("Release");
+  if (vtkSMPropertyHelper(pv::asked(this, "Held")).GetAsInt() == 0 && !this->IsOutdated()) return;
+  pv::command(this, "Release");
   this->MarkDirty(this);
 }
 

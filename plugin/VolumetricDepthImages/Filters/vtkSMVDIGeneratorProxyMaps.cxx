@@ -21,6 +21,7 @@
 #include <utility>
 
 #include "VDIMaps.h"
+#include "VDIServer.h"
 #include "vdi/core/ComponentValues.h"
 #include "vtkSMVDIGeneratorProxy.h"
 
@@ -75,7 +76,9 @@ void vtkSMVDIGeneratorProxy::WatchMap() {
 
 void vtkSMVDIGeneratorProxy::MapUpdated() {
   const int named = pv::componentNamedBy(this->WatchedMap);
-  if (std::exchange(this->NamedComponent, named) == named || this->Choosing || !this->Taken) return;
+  if (std::exchange(this->NamedComponent, named) == named || this->Choosing || !this->Taken ||
+      !pv::isConnected(this->GetSession()))
+    return;
   if (RanksWithClients() != nullptr) {
     this->FollowsMap = true;  // the number of components is known once the ranks have met
   } else if (this->TakeNamedComponent()) {
@@ -107,7 +110,7 @@ void vtkSMVDIGeneratorProxy::FitToComponent() {
   }
   if (hasRange) this->AnnounceComponent(map, range);
   // The window holds a filter whose map changes, and would make a VDI of the old component with the new map.
-  this->InvokeCommand("Release");
+  pv::command(this, "Release");
   this->MarkDirty(this);
 }
 

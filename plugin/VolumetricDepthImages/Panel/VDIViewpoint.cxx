@@ -11,6 +11,8 @@
 
 #include <algorithm>
 
+#include "VDIServer.h"
+
 namespace pv {
 
 namespace {
@@ -30,9 +32,9 @@ bool showsOnly(pqView* view, pqPipelineSource* source) {
 }  // namespace
 
 std::optional<ViewpointNumbers> viewpointOf(vtkSMProxy* reader) {
-  reader->UpdatePropertyInformation(reader->GetProperty("Viewpoint"));
   ViewpointNumbers numbers{};
-  vtkSMPropertyHelper(reader, "Viewpoint").Get(numbers.data(), static_cast<unsigned int>(numbers.size()));
+  vtkSMPropertyHelper(asked(reader, "Viewpoint"))
+      .Get(numbers.data(), static_cast<unsigned int>(numbers.size()));
   if (std::equal(numbers.begin(), numbers.begin() + 3, numbers.begin() + 3)) return std::nullopt;
   return numbers;
 }

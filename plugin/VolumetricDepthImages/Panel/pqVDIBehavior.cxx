@@ -21,6 +21,7 @@
 #include <initializer_list>
 #include <string_view>
 
+#include "VDIServer.h"
 #include "VDISession.h"
 #include "VDIViewpoint.h"
 #include "pqVDIRegenerator.h"
@@ -32,6 +33,7 @@
 namespace {
 
 bool isLoadedOn(pqServer* server) {
+  if (!pv::isConnected(server->session())) return true;  // it can't be asked
   vtkPVPluginsInformation* plugins =
       vtkSMProxyManager::GetProxyManager()->GetPluginManager()->GetRemoteInformation(server->session());
   if (plugins == nullptr) return true;  // the plugins aren't known yet

@@ -78,7 +78,7 @@ pqVDIEstimateWidget::pqVDIEstimateWidget(vtkSMProxy* proxy, vtkSMProperty*, QWid
 pqVDIEstimateWidget::~pqVDIEstimateWidget() = default;
 
 void pqVDIEstimateWidget::estimate() {
-  if (this->proxy()->GetSession()->GetPendingProgress()) {  // as in pqVDIRegenerator::isUpdating
+  if (this->proxy()->GetSession()->GetPendingProgress()) {  // as in pv::mayAsk
     this->Soon.start();
     return;
   }

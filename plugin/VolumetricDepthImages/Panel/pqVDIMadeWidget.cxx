@@ -17,6 +17,7 @@
 
 #include <optional>
 
+#include "VDIServer.h"
 #include "VDIViewpoint.h"
 #include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
@@ -36,8 +37,7 @@ QString point(const double* numbers) {
 
 /// The meaning of the VDI's colours; nullopt for files of older versions, which lack it.
 std::optional<vdi::Coloring> coloringOf(vtkSMProxy* reader) {
-  reader->UpdatePropertyInformation(reader->GetProperty("Coloring"));
-  const char* said = vtkSMPropertyHelper(reader, "Coloring").GetAsString();
+  const char* said = vtkSMPropertyHelper(pv::asked(reader, "Coloring")).GetAsString();
   if (said == nullptr || *said == '\0') return std::nullopt;
   try {
     return vdi::io::coloringIn(said);

@@ -21,6 +21,8 @@
 #include <algorithm>
 #include <string>
 
+#include "VDIServer.h"
+#include "VDIServers.h"
 #include "VDIViews.h"
 #include "vtkSMVDIGeneratorProxy.h"
 #include "vtkVDIGenerator.h"
@@ -124,12 +126,6 @@ bool pqVDIRegenerator::isUsed() const {
                      [this](pqView* view) { return pv::showsResultOf(view, this->Source); });
 }
 
-/// Whether ParaView's server works for the window. ParaView's progress bar lets timers run meanwhile, but the
-/// filter may be in the middle of an update, which must not begin again.
-bool pqVDIRegenerator::isUpdating() const {
-  return this->Source->getServer()->isProgressPending();
-}
-
 bool pqVDIRegenerator::isShownIn(pqView* view) const {
   return pv::shows(view, this->Source);
 }
@@ -144,8 +140,8 @@ void pqVDIRegenerator::stateChanged() {
   if (this->Now == State::Idle) return;
   this->Looking.stop();
   this->Now = State::Idle;
-  this->generator()->InvokeCommand("Hold");  // gives the running preparation up
-  this->generator()->InvokeCommand("Release");
+  pv::command(this->generator(), "Hold");  // gives the running preparation up
+  pv::command(this->generator(), "Release");
   Q_EMIT this->progress(-1);
 }
 
@@ -203,7 +199,7 @@ void pqVDIRegenerator::lookWhetherViewsWait() {
   const bool defers = this->comparativeViews().empty() && !this->IsCaptured && !this->IsPlaying;
   if (defers == this->Defers) return;
   this->Defers = defers;
-  this->generator()->InvokeCommand(defers ? "DeferViews" : "DeferNoViews");
+  pv::command(this->generator(), defers ? "DeferViews" : "DeferNoViews");
 }
 
 /// Starts a preparation if the view has asked for a VDI that isn't made yet.
@@ -226,14 +222,12 @@ void pqVDIRegenerator::applies() {
 }
 
 int pqVDIRegenerator::preparation() {
-  this->generator()->InvokeCommand("ServePreparation");
-  vtkSMProperty* property = this->generator()->GetProperty("Preparation");
-  this->generator()->UpdatePropertyInformation(property);
-  return vtkSMPropertyHelper(property).GetAsInt();
+  pv::command(this->generator(), "ServePreparation");
+  return vtkSMPropertyHelper(pv::asked(this->generator(), "Preparation")).GetAsInt();
 }
 
 void pqVDIRegenerator::hold(int restMilliseconds) {
-  this->generator()->InvokeCommand("Hold");
+  pv::command(this->generator(), "Hold");
   this->Now = State::Waiting;
   this->Rest = restMilliseconds;
   this->Resting.start();
@@ -246,7 +240,7 @@ void pqVDIRegenerator::mapChanged() {
 }
 
 void pqVDIRegenerator::look() {
-  if (this->isUpdating()) return;
+  if (!pv::mayAsk(this->Source->getServer())) return;
   if (QApplication::mouseButtons() != Qt::NoButton) {
     this->Resting.start();
     return;
@@ -259,7 +253,7 @@ void pqVDIRegenerator::look() {
     }
     // The preparation of an earlier edit has been given up, but takes a moment to end.
     if (const int earlier = this->preparation(); earlier >= 0 && earlier < 100) return;
-    this->generator()->InvokeCommand("Prepare");
+    pv::command(this->generator(), "Prepare");
     this->Now = State::Preparing;
     Q_EMIT this->progress(0);
     return;
@@ -275,7 +269,7 @@ void pqVDIRegenerator::look() {
 void pqVDIRegenerator::finish() {
   this->Looking.stop();
   this->Now = State::Idle;
-  this->generator()->InvokeCommand("Release");
+  pv::command(this->generator(), "Release");
   this->generator()->MarkDirty(this->generator());
   // These views have kept the held filter's output.
   for (pqView* view : this->comparativeViews()) view->getProxy()->MarkDirty(this->generator());
@@ -335,7 +329,7 @@ void pqVDIRegenerator::leaveToUser() {
 }
 
 void pqVDIRegenerator::lookAtViews() {
-  if (this->isUpdating()) return;
+  if (!pv::mayAsk(this->Source->getServer())) return;
   vtkSMVDIGeneratorProxy* own = this->generator();
   if (vtkSMPropertyHelper(own, "Auto").GetAsInt() == 0 || this->Now != State::Idle ||
       this->Source->modifiedState() == pqProxy::UNINITIALIZED)

@@ -67,7 +67,6 @@ class pqVDIRegenerator : public QObject {
   enum class State { Idle, Waiting, Preparing };
 
   vtkSMVDIGeneratorProxy* generator() const;
-  bool isUpdating() const;
   bool isUsed() const;
   bool isShownIn(pqView* view) const;
   QList<pqView*> comparativeViews() const;

@@ -4,6 +4,7 @@
 #include <pqApplicationCore.h>
 #include <pqFileDialog.h>
 #include <pqOutputPort.h>
+#include <pqServer.h>
 #include <pqSettings.h>
 #include <vtkDataObject.h>
 #include <vtkPVDataInformation.h>
@@ -13,11 +14,14 @@
 #include <QTimer>
 #include <QVariant>
 
+#include "VDIServer.h"
+
 namespace {
 
 bool isVdiSelected() {
   pqOutputPort* port = pqActiveObjects::instance().activePort();
-  vtkPVDataInformation* data = port != nullptr ? port->getDataInformation() : nullptr;
+  if (port == nullptr || !pv::isConnected(port->getServer()->session())) return false;
+  vtkPVDataInformation* data = port->getDataInformation();
   return data != nullptr && data->GetArrayInformation("VDI.offsets", vtkDataObject::FIELD) != nullptr;
 }
 

@@ -1,7 +1,6 @@
 #include "pqVDIStillFrames.h"
 
 #include <pqApplicationCore.h>
-#include <pqServer.h>
 #include <pqServerManagerModel.h>
 #include <pqView.h>
 #include <vtkPVRenderView.h>
@@ -14,6 +13,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "VDIServers.h"
 #include "vtkVDIProp.h"
 #include "vtkVDIRepresentation.h"
 
@@ -104,9 +104,7 @@ void pqVDIStillFrames::rendered() {
 void pqVDIStillFrames::look() {
   const QList<QPointer<pqView>> views = this->Behind;
   for (const QPointer<pqView>& view : views) {
-    // During an update, ParaView's progress bar lets timers run. A frame would then request a VDI from
-    // within the update that makes it.
-    if (view != nullptr && view->getServer()->isProgressPending()) continue;
+    if (view != nullptr && !pv::mayAsk(view->getServer())) continue;
     if (view != nullptr && isBehind(view)) {
       if (hasMore(view)) view->forceRender();
     } else {

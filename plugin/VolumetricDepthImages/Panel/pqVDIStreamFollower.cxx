@@ -8,6 +8,8 @@
 #include <vtkSMSourceProxy.h>
 #include <QApplication>
 
+#include "VDIServer.h"
+#include "VDIServers.h"
 #include "VDIViewpoint.h"
 #include "VDIViews.h"
 
@@ -40,21 +42,18 @@ void pqVDIStreamFollower::lookFromViewpoint() {
 void pqVDIStreamFollower::look() {
   // Neither interrupts a user who turns the view nor waits for a busy server.
   if (this->Source->modifiedState() == pqProxy::UNINITIALIZED ||
-      QApplication::mouseButtons() != Qt::NoButton || this->Source->getServer()->isProgressPending())
+      QApplication::mouseButtons() != Qt::NoButton || !pv::mayAsk(this->Source->getServer()))
     return;
   auto* proxy = vtkSMSourceProxy::SafeDownCast(this->Source->getProxy());
-  for (const char* name : {"Arrivals", "Connection"})
-    proxy->UpdatePropertyInformation(proxy->GetProperty(name));
-  const int arrivals = vtkSMPropertyHelper(proxy, "Arrivals").GetAsInt();
+  const int arrivals = vtkSMPropertyHelper(pv::asked(proxy, "Arrivals")).GetAsInt();
   if (arrivals != this->Seen) {
     this->Seen = arrivals;
-    proxy->InvokeCommand("Take");
+    pv::command(proxy, "Take");
     proxy->MarkDirty(proxy);
     pv::renderViewsOf(this->Source);
     if (this->WaitsForFirst) this->lookFromViewpoint();
-    proxy->UpdatePropertyInformation(proxy->GetProperty("Connection"));
   }
-  const QString line = vtkSMPropertyHelper(proxy, "Connection").GetAsString();
+  const QString line = vtkSMPropertyHelper(pv::asked(proxy, "Connection")).GetAsString();
   if (line == this->Line) return;
   this->Line = line;
   Q_EMIT this->lineChanged();

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "VDIMaps.h"
+#include "VDIServer.h"
 #include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/Metadata.h"
@@ -104,8 +105,7 @@ vtkSMVDIRepresentationProxy::Legend vtkSMVDIRepresentationProxy::LegendOfInput()
 vtkSMVDIRepresentationProxy::Legend vtkSMVDIRepresentationProxy::LegendOfFile(vtkSMProxy* reader) {
   vtkSMProperty* property = reader->GetProperty("Coloring");
   if (property == nullptr || property->GetInformationOnly() == 0) return {};
-  reader->UpdatePropertyInformation(property);
-  const char* said = vtkSMPropertyHelper(property).GetAsString();
+  const char* said = vtkSMPropertyHelper(pv::asked(reader, "Coloring")).GetAsString();
   const std::string text = said != nullptr ? said : "";
   if (text.empty()) return {};
   vdi::Coloring coloring;
