@@ -1,5 +1,7 @@
+# script-version: 2.0
 """A Catalyst script for simulations that hand unstructured grids to ParaView's Catalyst by an
-adaptor of their own. Resample To Image turns the grid into a lattice, of which a VDI is made."""
+adaptor of their own. Resample To Image turns the grid into a lattice, of which a VDI is made. The
+first line tells ParaView's Python bridge that this isn't a script of Catalyst 1."""
 
 from paraview import catalyst
 from paraview.simple import *  # noqa: F403

@@ -213,13 +213,25 @@ def state():
 
 def of_grid(name):
     os.chdir(folder_of(name))
-    run_on(2, sys.executable, SIMULATION, "grid", smaller(name))
+    run_on(2, sys.executable, SIMULATION, "grid", smaller(name), path_of("tetrahedra.py"))
     return os.getcwd()
 
 
 @recipe("unstructured.py", of_grid)
 def unstructured():
     picture_of("vdi_000030.vdi")
+
+
+def of_tetrahedra(name):
+    os.chdir(folder_of(name))
+    run_on(3, sys.executable, smaller(name))
+    run_on(3, sys.executable, SIMULATION, "lattice", path_of(name))
+    return os.getcwd()
+
+
+@recipe("tetrahedra.py", of_tetrahedra)
+def tetrahedra():
+    differ([picture_of("bar_%06d.vdi" % step) for step in (0, 1)])
 
 
 def of_part(name):
