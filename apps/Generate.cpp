@@ -15,6 +15,7 @@
 #include "apps/Source.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
+#include "vdi/core/SamplingRate.h"
 #include "vdi/io/Png.h"
 #include "vdi/io/VdiFile.h"
 #include "vdi/pipeline/VdiGenerator.h"
@@ -176,6 +177,7 @@ class Series {
                                          : rawArray(options_.raws.front());
       shot.camera = makeCamera(options_.view, generator_.scene());
       shot.function = makeTransferFunction(options_.quality, generator_.scene(), generator_.scalarRange());
+      if (world_.rank() == 0) noteRange(shot.function);
     });
     // While one step's frame is made, the next step travels to the device, and the step after that
     // is read.
@@ -191,6 +193,15 @@ class Series {
   }
 
  private:
+  /// Says that the colours' automatic range is much wider than the first step's values.
+  void noteRange(const TransferFunction& function) const {
+    const ScalarRange& range = generator_.scalarRange();
+    const bool isAutomatic = function.colors.front().x == range.min && function.colors.back().x == range.max;
+    const std::optional<ScalarRange> part = isAutomatic ? generator_.crowdedPart() : std::nullopt;
+    if (part) {
+      fmt::print(stderr, "vdi: {} (--transfer-function FILE, --missing)\n", describeCrowded(range, *part));
+    }
+  }
   std::vector<Block> read(std::size_t index) const {
     return options_.raws.empty()
                ? fieldBlocks(options_.field, options_.decomposition, device_, world_.rank(), world_.size())

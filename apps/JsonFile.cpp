@@ -116,6 +116,13 @@ std::string JsonFile::choice(const char* name, const std::set<std::string>& choi
   return value;
 }
 
+std::vector<double> JsonFile::numbers(const char* name) const {
+  const json& value = at(name);
+  if (!value.is_array() || !isNumbers(value, value.size()))
+    fail(fmt::format("'{}' must be a list of numbers", name));
+  return value.get<std::vector<double>>();
+}
+
 std::vector<std::vector<double>> JsonFile::rows(const char* name, std::size_t width) const {
   const json& value = at(name);
   const auto require = [&](bool good) {

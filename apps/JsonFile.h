@@ -34,6 +34,7 @@ class JsonFile {
   glm::ivec3 positives(const char* name) const;  // three whole numbers >= 1
   /// One of `choices`.
   std::string choice(const char* name, const std::set<std::string>& choices) const;
+  std::vector<double> numbers(const char* name) const;
   /// An array of rows of `width` numbers each.
   std::vector<std::vector<double>> rows(const char* name, std::size_t width) const;
 

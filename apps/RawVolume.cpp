@@ -6,6 +6,7 @@
 #include <bit>
 
 #include "apps/JsonFile.h"
+#include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/io/Files.h"
 
@@ -50,13 +51,14 @@ void requireSize(const JsonFile& sidecar, const RawVolume& volume) {
 }  // namespace
 
 RawVolume readSidecar(const std::filesystem::path& path) {
-  const JsonFile sidecar(path,
-                         {"file", "dims", "type", "spacing", "origin", "endianness", "association", "skip"});
+  const JsonFile sidecar(
+      path, {"file", "dims", "type", "spacing", "origin", "endianness", "association", "skip", "missing"});
   RawVolume volume;
   volume.data = path.parent_path() / sidecar.text("file");
   volume.lattice = readLattice(sidecar);
   volume.bigEndian = sidecar.has("endianness") && sidecar.choice("endianness", {"little", "big"}) == "big";
   if (sidecar.has("skip")) volume.skip = sidecar.count("skip");
+  if (sidecar.has("missing")) volume.missing = sidecar.numbers("missing");
   requireSize(sidecar, volume);
   return volume;
 }
@@ -82,7 +84,9 @@ Block readPart(const RawVolume& volume, const synthetic::Part& part) {
   if (volume.bigEndian != (std::endian::native == std::endian::big)) {
     for (std::size_t i = 0; i < total; i += size) std::reverse(data.get() + i, data.get() + i + size);
   }
-  return synthetic::blockOf(volume.lattice, part, data);
+  Block block = synthetic::blockOf(volume.lattice, part, data);
+  leaveOutMissing(block, volume.missing);
+  return block;
 }
 
 }  // namespace vdi::apps

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <vector>
 
 #include "vdi/synthetic/Decomposition.h"
 
@@ -12,7 +13,8 @@ struct RawVolume {
   synthetic::Lattice lattice;  // joint: SharedPoints for point data, Cells for cell data
   std::filesystem::path data;  // the raw file
   bool bigEndian = false;
-  std::uint64_t skip = 0;  // bytes before the first value
+  std::uint64_t skip = 0;         // bytes before the first value
+  std::vector<double> missing{};  // numbers that stand for missing values
 };
 
 /// Throws Error: Io if a file is missing; Format if the sidecar is not JSON, lacks a field, or has

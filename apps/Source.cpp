@@ -11,6 +11,7 @@
 #include "apps/RawVolume.h"
 #include "apps/TransferFunctions.h"
 #include "vdi/config/Presets.h"
+#include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/SettingsTable.h"
 #include "vdi/synthetic/DeviceField.h"
@@ -129,6 +130,13 @@ void addDecompositionOptions(CLI::App& command, DecompositionOptions& options) {
                   "held twice; cells: cell data; default: shared, or the raw volume's")
       ->type_name("JOINT")
       ->group(decompositionGroup);
+  command
+      .add_option("--missing", options.missing,
+                  "numbers that stand for missing values, such as -9999; these are transparent and don't "
+                  "count in ranges")
+      ->expected(1, -1)
+      ->type_name("X")
+      ->group(decompositionGroup);
 }
 
 std::vector<Block> rawBlocks(const std::string& sidecar, const DecompositionOptions& options, int rank,
@@ -142,6 +150,7 @@ std::vector<Block> rawBlocks(const std::string& sidecar, const DecompositionOpti
     }
     volume.lattice.joint = joint;
   }
+  volume.missing.insert(volume.missing.end(), options.missing.begin(), options.missing.end());
   std::vector<Block> blocks;
   for (const synthetic::Part& part : synthetic::decompose(
            volume.lattice.size, vectorOf(parseSizes(options.blocks, 3)),
@@ -196,8 +205,10 @@ std::vector<Block> fieldBlocks(const std::string& name, const DecompositionOptio
       synthetic::decompose(all.size, vectorOf(parseSizes(options.blocks, 3)) * copies,
                            synthetic::layoutFromString(options.layout), lattice.joint, ranks, options.seed);
   std::erase_if(parts, [rank](const synthetic::Part& part) { return part.owner != rank; });
-  return synthetic::DeviceField(device, name, options.seed)
-      .makeBlocks(lattice, all, parts, topOf(lattice.type));
+  std::vector<Block> blocks =
+      synthetic::DeviceField(device, name, options.seed).makeBlocks(lattice, all, parts, topOf(lattice.type));
+  for (Block& block : blocks) leaveOutMissing(block, options.missing);
+  return blocks;
 }
 
 void addCameraOptions(CLI::App& command, CameraOptions& options, const std::string& otherwise) {

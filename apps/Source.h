@@ -32,7 +32,8 @@ struct DecompositionOptions {
   std::uint32_t seed = 1;
   std::string blocks = "2x2x2";
   std::string layout = "interleaved";
-  std::string joint;  // empty: the raw volume's, or shared points
+  std::string joint;            // empty: the raw volume's, or shared points
+  std::vector<double> missing;  // numbers that stand for missing values, beside the raw volume's
 };
 void addDecompositionOptions(CLI::App& command, DecompositionOptions& options);
 

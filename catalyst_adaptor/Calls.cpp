@@ -143,9 +143,13 @@ std::unique_ptr<unsigned char[]> newMarks(const vdi_catalyst_block& block) {
   return marks;
 }
 
-void checkOffset(const char* name, std::int32_t association, const double* offset) {
+void checkName(const char* name, std::int32_t association) {
   require(name != nullptr && *name != '\0', "an array needs a name");
   require(association == VDI_CATALYST_POINTS || association == VDI_CATALYST_CELLS, "unknown association");
+}
+
+void checkOffset(const char* name, std::int32_t association, const double* offset) {
+  checkName(name, association);
   require(offset != nullptr, "no offset given");
   for (int axis = 0; axis < 3; ++axis)
     require(std::abs(offset[axis]) <= 0.5, "an array's offset must be at most half a cell");  // false for NaN

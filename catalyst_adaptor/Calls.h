@@ -20,6 +20,8 @@ namespace vdi::catalyst {
 
 /// The maximum number of components of an array.
 inline constexpr int maxComponents = 16;
+/// The maximum number of numbers that stand for an array's missing values.
+inline constexpr int maxMissing = 64;
 
 /// The part of a handle that these functions use.
 struct Calls {
@@ -104,6 +106,8 @@ void checkBlocks(std::int32_t count, const vdi_catalyst_block* blocks);
 /// Memory for a mark of each of the block's cells, which ParaView needs if some are ghost cells; null if none
 /// are. Throws std::runtime_error if there is too little memory.
 std::unique_ptr<unsigned char[]> newMarks(const vdi_catalyst_block& block);
+/// Throws std::invalid_argument with the reason if an array can't have the name or association.
+void checkName(const char* name, std::int32_t association);
 /// Throws std::invalid_argument with the reason if an array can't have the name, association or offset.
 void checkOffset(const char* name, std::int32_t association, const double* offset);
 /// Throws std::invalid_argument with the reason unless the time of a step is finite: files hold no others.

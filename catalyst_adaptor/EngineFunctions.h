@@ -37,6 +37,7 @@ typedef struct vdi_catalyst_functions {
   int (*set_array_strided)(vdi_catalyst*, const char*, int32_t, int32_t, int32_t, const void* const*,
                            const vdi_catalyst_strides*);
   int (*set_array_offset)(vdi_catalyst*, const char*, int32_t, const double*);
+  int (*set_array_missing)(vdi_catalyst*, const char*, int32_t, int32_t, const double*);
   int (*set_particles)(vdi_catalyst*, const char*, const vdi_catalyst_particles*);
   int (*wants)(vdi_catalyst*, int64_t, double);
   void (*wanted_steps)(vdi_catalyst*, int64_t first, int32_t count, uint8_t* wanted);

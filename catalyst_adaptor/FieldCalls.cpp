@@ -80,6 +80,20 @@ int setArrayOffset(FieldCalls& self, const char* name, std::int32_t association,
   return code;
 }
 
+int setArrayMissing(FieldCalls& self, const char* name, std::int32_t association, std::int32_t count,
+                    const double* values) {
+  Fields::Change change;
+  const int code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
+    require(self.haveBlocks, "missing values were given before blocks");
+    checkName(name, association);
+    require(count >= 0 && count <= maxMissing, "the number of missing values must be 0 to 64");
+    require(count == 0 || values != nullptr, "missing values without numbers");
+    change = Fields::missingChange(name, association == VDI_CATALYST_CELLS, {values, values + count});
+  });
+  if (code == VDI_CATALYST_OK) self.fields.set(std::move(change));
+  return code;
+}
+
 int setParticles(FieldCalls& self, const char* name, const vdi_catalyst_particles* particles) {
   ParticleArray array;
   Fields::Change change;

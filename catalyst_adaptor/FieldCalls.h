@@ -33,6 +33,8 @@ int setArray(FieldCalls& self, const GivenArray& array, const void* const* data)
 int setArrayStrided(FieldCalls& self, const GivenArray& array, const void* const* data,
                     const vdi_catalyst_strides* strides);
 int setArrayOffset(FieldCalls& self, const char* name, std::int32_t association, const double* offset);
+int setArrayMissing(FieldCalls& self, const char* name, std::int32_t association, std::int32_t count,
+                    const double* values);
 int setParticles(FieldCalls& self, const char* name, const vdi_catalyst_particles* particles);
 /// The checks with which `execute` begins. `requireOwn` makes those of the engine; it may throw, but must not
 /// communicate.

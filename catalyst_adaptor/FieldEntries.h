@@ -33,6 +33,12 @@ struct FieldEntries {
     [[maybe_unused]] const Lock lock;
     return catalyst::setArrayOffset(*handle, name, association, offset);
   }
+  static int setArrayMissing(Handle* handle, const char* name, std::int32_t association, std::int32_t count,
+                             const double* values) {
+    if (!usable(handle)) return VDI_CATALYST_BAD_ARGUMENT;
+    [[maybe_unused]] const Lock lock;
+    return catalyst::setArrayMissing(*handle, name, association, count, values);
+  }
   static int setParticles(Handle* handle, const char* name, const vdi_catalyst_particles* particles) {
     [[maybe_unused]] const Lock lock;
     return catalyst::setParticles(*handle, name, particles);
@@ -57,6 +63,7 @@ struct FieldEntries {
     table.set_array = setArray;
     table.set_array_strided = setArrayStrided;
     table.set_array_offset = setArrayOffset;
+    table.set_array_missing = setArrayMissing;
     table.set_particles = setParticles;
     table.parameter_f64 = parameterF64;
     table.parameter_i64 = parameterI64;

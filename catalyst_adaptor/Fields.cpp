@@ -44,12 +44,10 @@ Block blockAt(const vdi_catalyst_block& b, bool cells, const glm::dvec3& offset,
   return block;
 }
 
-ComponentArray arrayOf(const StridedValues& values, int type) {
-  return {values.first,
-          {values.strides[0], values.strides[1], values.strides[2]},
-          componentTypeOf(type),
-          values.components,
-          values.componentStride};
+ComponentArray arrayOf(const StridedValues& values, int type, const std::vector<double>& missing) {
+  return {values.first,           {values.strides[0], values.strides[1], values.strides[2]},
+          componentTypeOf(type),  values.components,
+          values.componentStride, missing};
 }
 
 /// Moves the entries of `fresh` to `all`. Replaces entries that have the same keys.
@@ -74,6 +72,7 @@ void Fields::setBlocks(std::vector<vdi_catalyst_block> blocks) {
   blocks_ = std::move(blocks);
   arrays_.clear();
   offsets_.clear();
+  missing_.clear();
   particles_.clear();
   deposits_.clear();
   ++version_;
@@ -112,6 +111,13 @@ Fields::Change Fields::offsetChange(const std::string& name, bool cells,
   return change;
 }
 
+Fields::Change Fields::missingChange(const std::string& name, bool cells, std::vector<double> missing) {
+  Change change;
+  change.key_ = {cells, name};
+  change.missing_[change.key_] = std::move(missing);
+  return change;
+}
+
 Fields::Change Fields::particlesChange(const std::string& name, const ParticleArray& particles) {
   Change change;
   change.key_ = {true, name};
@@ -122,10 +128,8 @@ Fields::Change Fields::particlesChange(const std::string& name, const ParticleAr
 void Fields::set(Change change) noexcept {
   const auto& [cells, name] = change.key_;
   ++changes_;
-  if (!change.offset_.empty()) {
-    replace(offsets_, change.offset_);
-    return;
-  }
+  if (!change.offset_.empty()) return replace(offsets_, change.offset_);
+  if (!change.missing_.empty()) return replace(missing_, change.missing_);
   if (cells) {
     particles_.erase(name);
     deposits_.erase(name);
@@ -146,6 +150,12 @@ void Fields::put(std::map<Key, Array>& fresh) noexcept {
 glm::dvec3 Fields::offsetOf(const std::string& name, bool cells) const {
   const auto found = offsets_.find({cells, name});
   return found != offsets_.end() ? found->second : glm::dvec3(0.0);
+}
+
+const std::vector<double>& Fields::missingOf(const std::string& name, bool cells) const {
+  static const std::vector<double> none;
+  const auto found = missing_.find({cells, name});
+  return found != missing_.end() ? found->second : none;
 }
 
 const ParticleArray* Fields::particlesOf(const std::string& name) const {
@@ -206,7 +216,8 @@ std::optional<bool> Fields::associationOf(const std::string& name) const {
 std::vector<Fields::NamedArray> Fields::arrays() const {
   std::vector<NamedArray> arrays;
   for (const auto& [key, array] : arrays_)
-    arrays.push_back({key.second, key.first, array.type, offsetOf(key.second, key.first), array.values});
+    arrays.push_back({key.second, key.first, array.type, offsetOf(key.second, key.first),
+                      missingOf(key.second, key.first), array.values});
   std::ranges::sort(arrays, {}, [&](const NamedArray& array) { return find(array.name, array.cells)->set; });
   return arrays;
 }
@@ -219,7 +230,8 @@ int Fields::componentsOf(const std::string& name, bool cells) const {
   return found != array->values.end() ? found->components : 1;
 }
 
-Fields::Values Fields::valuesOf(const std::string& name, bool cells, int component) const {
+std::vector<Block> Fields::blocksOf(const std::string& name, bool cells, int component,
+                                    std::span<const double> missing) const {
   const Array* array = find(name, cells);
   if (array == nullptr) return {};
   const int components = componentsOf(name, cells);
@@ -233,7 +245,19 @@ Fields::Values Fields::valuesOf(const std::string& name, bool cells, int compone
     throw std::runtime_error("component " + std::to_string(component) + " doesn't exist: '" + name +
                              "' has " + std::to_string(components));
   }
-  return {array->type, array->values};
+  const glm::dvec3 offset = offsetOf(name, cells);
+  std::vector<double> allMissing = missingOf(name, cells);
+  allMissing.insert(allMissing.end(), missing.begin(), missing.end());
+  std::vector<Block> blocks;
+  for (std::size_t i = 0; i < array->values.size(); ++i) {
+    const StridedValues& values = array->values[i];
+    if (values.first == nullptr) continue;
+    Block& block = blocks.emplace_back(blockAt(blocks_[i], cells, offset, values.first));
+    // An array of one component has only that one to show.
+    showComponent(block, arrayOf(values, array->type, allMissing),
+                  values.components > 1 ? component : magnitude);
+  }
+  return blocks;
 }
 
 std::vector<Block> Fields::placesOf(const std::string& name, bool cells) const {
@@ -247,20 +271,6 @@ std::vector<Block> Fields::placesOf(const std::string& name, bool cells) const {
       places.push_back(blockAt(blocks_[i], cells, offset, &blocks_[i]));
   }
   return places;
-}
-
-std::vector<Block> Fields::blocksOf(const std::string& name, bool cells, int component) const {
-  const Values all = valuesOf(name, cells, component);
-  const glm::dvec3 offset = offsetOf(name, cells);
-  std::vector<Block> blocks;
-  for (std::size_t i = 0; i < all.blocks.size(); ++i) {
-    const StridedValues& values = all.blocks[i];
-    if (values.first == nullptr) continue;
-    Block& block = blocks.emplace_back(blockAt(blocks_[i], cells, offset, values.first));
-    // An array of one component has only that one to show.
-    showComponent(block, arrayOf(values, all.type), values.components > 1 ? component : magnitude);
-  }
-  return blocks;
 }
 
 bool agreeOnCells(const comm::Communicator& comm, const Fields& fields, const std::string& name,

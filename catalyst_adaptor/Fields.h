@@ -41,6 +41,8 @@ class Fields {
   /// An array's values, one entry for each block, with the same number of components. Blocks that lack the
   /// array have a null `first`. An array of cells replaces particles of that name.
   static Change arrayChange(const std::string& name, bool cells, int type, std::vector<StridedValues> values);
+  /// Makes the numbers stand for missing values of that array, instead of those before.
+  static Change missingChange(const std::string& name, bool cells, std::vector<double> missing);
   /// Shifts the values of that array by `offset` cells from the points or the centres of cells.
   static Change offsetChange(const std::string& name, bool cells, const std::array<double, 3>& offset);
   /// Particles to deposit into a cell array, which replaces a cell array of that name.
@@ -67,6 +69,7 @@ class Fields {
     bool cells = false;
     int type = VDI_CATALYST_F64;
     glm::dvec3 offset{0.0};                 // in cells
+    std::vector<double> missing{};          // as missingOf gives them
     std::span<const StridedValues> blocks;  // one entry for each block; null `first` where a block lacks it
   };
   /// All arrays, where the simulation has their values, in the order in which they were first set.
@@ -75,23 +78,18 @@ class Fields {
   const std::map<std::string, ParticleArray>& particles() const { return particles_; }
   /// The offset of an array's values, in cells. It may be given before the array.
   glm::dvec3 offsetOf(const std::string& name, bool cells) const;
+  /// The numbers that stand for an array's missing values. They may be given before the array.
+  const std::vector<double>& missingOf(const std::string& name, bool cells) const;
 
   int componentsOf(const std::string& name, bool cells) const;  // 1 if none of this rank's blocks has it
-  /// An array's values where the simulation has them, one for each block; null where a block lacks them.
-  /// Empty if this rank lacks the array.
-  struct Values {
-    int type = VDI_CATALYST_F64;
-    std::span<const StridedValues> blocks;
-  };
-  /// The values of an array. `component` is one of the array's, `magnitude` or `phase`. Throws
-  /// std::runtime_error if the array has no such component.
-  Values valuesOf(const std::string& name, bool cells, int component) const;
   /// The blocks that have the array, without its values: each has its place, the box that it owns, and the
   /// number of its values. Their `data` are the addresses of this object's blocks.
   std::vector<Block> placesOf(const std::string& name, bool cells) const;
   /// The blocks that have the array, with its values. They read these where they are; nothing is copied.
-  /// Throws as valuesOf does.
-  std::vector<Block> blocksOf(const std::string& name, bool cells, int component) const;
+  /// `component` is one of the array's, `magnitude` or `phase`; `missing` are numbers that stand for missing
+  /// values, beside those of missingOf. Throws std::runtime_error if the array has no such component.
+  std::vector<Block> blocksOf(const std::string& name, bool cells, int component,
+                              std::span<const double> missing = {}) const;
 
  private:
   struct Array {
@@ -108,6 +106,7 @@ class Fields {
   std::uint64_t changes_ = 0;
   std::map<Key, Array> arrays_;
   std::map<Key, glm::dvec3> offsets_;  // in cells; none: 0
+  std::map<Key, std::vector<double>> missing_;
   std::map<std::string, ParticleArray> particles_;
   std::map<std::string, DepositedValues> deposits_;  // the memory of arrays made from particles
 };
@@ -118,6 +117,7 @@ class Fields::Change {
   // One of these has an entry, whose memory becomes that of the fields.
   std::map<Key, Array> array_;
   std::map<Key, glm::dvec3> offset_;
+  std::map<Key, std::vector<double>> missing_;
   std::map<std::string, ParticleArray> particles_;
 };
 

@@ -132,6 +132,15 @@ module vdi_catalyst
       integer(c_int) :: code
     end function
 
+    function vdi_catalyst_set_array_missing(catalyst, name, association, count, values) bind(c) result(code)
+      import :: c_char, c_double, c_int, c_int32_t, c_ptr
+      type(c_ptr), value :: catalyst
+      character(kind=c_char), intent(in) :: name(*)
+      integer(c_int32_t), value :: association, count
+      real(c_double), intent(in) :: values(*)
+      integer(c_int) :: code
+    end function
+
     function vdi_catalyst_set_particles(catalyst, name, particles) bind(c) result(code)
       import :: c_char, c_int, c_ptr, vdi_catalyst_particles
       type(c_ptr), value :: catalyst

@@ -222,6 +222,17 @@ VDI_CATALYST_API int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, cons
 VDI_CATALYST_API int vdi_catalyst_set_array_offset(vdi_catalyst* catalyst, const char* name,
                                                    int32_t association, const double offset[3]);
 
+/* Makes numbers stand for missing values of an array, as the fill values of netCDF files do: a value that
+ * equals one of them, once that is rounded to the array's type, is transparent, with all that would be
+ * interpolated with it, and counts in no range and no condition. A vector is missing where a shown component
+ * is. `count` is 0 to 64; each call replaces the numbers before, and they are equal on all ranks. They belong
+ * to an association and a name, and may come before the array; vdi_catalyst_set_blocks forgets them. Values
+ * of 8 and 16 bits then take 4 bytes each on the device, and integers of 32 bits get doubles' range. NaN is
+ * missing in any case. In scripts, VolumetricDepthImage leaves missing values out; ParaView's own filters
+ * find NaN in arrays of floating-point numbers, and integers as they are. */
+VDI_CATALYST_API int vdi_catalyst_set_array_missing(vdi_catalyst* catalyst, const char* name,
+                                                    int32_t association, int32_t count, const double* values);
+
 /* The value of a cell that particles are deposited on. */
 enum {
   VDI_CATALYST_SUM = 0,    /* the weight in the cell */

@@ -3,12 +3,16 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "vdi/core/Block.h"
 #include "vdi/core/Camera.h"
+#include "vdi/core/ComponentValues.h"
 #include "vdi/core/Image.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/reference/Exact.h"
@@ -38,7 +42,17 @@ constexpr Stretch stretches[] = {
     {ScalarType::F32, -7.5, -2.25},     {ScalarType::F64, 1.0e-6, 3.0e-6},
 };
 
-/// A lattice whose longest side is 1: this rank's blocks, and the whole volume of the exact reference.
+/// Numbers that stand for missing values of a type, beyond its range above or at its end.
+constexpr double fills[] = {255.0, -128.0, 65535.0, -32768.0, 0.0, -9999.0, 1e20, 9.969209968386869e36};
+
+/// Where opticalScene has missing values. None is next to a value at a face: there the device, whose filters
+/// read a little of the next value, leaves out the outer half of the cell, too.
+inline bool isMissing(const glm::ivec3& index) {
+  return glm::length(glm::dvec3(index) - glm::dvec3(6.5, 5.0, 5.5)) < 3.2;
+}
+
+/// A lattice whose longest side is 1: this rank's blocks, and the whole volume of the exact reference. Values
+/// that isMissing names are `fill`, if that is given.
 struct OpticalScene {
   std::vector<Block> mine;
   reference::ExactVolume whole;
@@ -47,17 +61,20 @@ struct OpticalScene {
 inline OpticalScene opticalScene(const Stretch& stretch, synthetic::Joint joint,
                                  const glm::ivec3& blocks = glm::ivec3(1),
                                  synthetic::Layout layout = synthetic::Layout::OnOneRank, int rank = 0,
-                                 int ranks = 1) {
+                                 int ranks = 1, std::optional<double> fill = {}) {
   const glm::ivec3 size{13, 11, 12};
   const bool cells = joint == synthetic::Joint::Cells;
   const double spacing = 1.0 / (13 - (cells ? 0 : 1));
   const auto valueAt = [&](const glm::ivec3& index) {
+    if (fill && isMissing(index)) return *fill;
     return stretch.at(waves((glm::dvec3(index) + (cells ? 0.5 : 0.0)) * spacing));
   };
   const synthetic::Lattice lattice{size, glm::dvec3(0.0), glm::dvec3(spacing), stretch.type, joint};
   OpticalScene scene;
   for (const synthetic::Part& part : synthetic::decompose(size, blocks, layout, joint, ranks, 3)) {
-    if (part.owner == rank) scene.mine.push_back(synthetic::makeBlock(lattice, part, valueAt));
+    if (part.owner != rank) continue;
+    scene.mine.push_back(synthetic::makeBlock(lattice, part, valueAt));
+    if (fill) leaveOutMissing(scene.mine.back(), std::array{*fill, 0.5, 1e300});
   }
   scene.whole = {size,
                  glm::dvec3(cells ? 0.5 * spacing : 0.0),
@@ -69,7 +86,11 @@ inline OpticalScene opticalScene(const Stretch& stretch, synthetic::Joint joint,
     for (int y = 0; y < size.y; ++y) {
       for (int x = 0; x < size.x; ++x) {
         const double value = valueAt({x, y, z});
-        scene.whole.values.push_back(whole ? std::round(value) : value);
+        if (fill && isMissing({x, y, z})) {
+          scene.whole.values.push_back(std::numeric_limits<double>::quiet_NaN());
+        } else {
+          scene.whole.values.push_back(whole ? std::round(value) : value);
+        }
       }
     }
   }

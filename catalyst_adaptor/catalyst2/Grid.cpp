@@ -192,6 +192,22 @@ std::vector<Leaf> componentsOf(const Node& values) {
   return all;
 }
 
+/// The numbers that stand for a field's missing values, by the names that netCDF and CF give them.
+std::vector<double> missingOf(const Node& field) {
+  std::vector<double> missing;
+  for (const char* folder : {"", "attributes/", "metadata/"}) {
+    for (const char* name : {"_FillValue", "missing_value"}) {
+      const std::optional<Node> node = field.find(std::string(folder) + name);
+      if (!node) continue;
+      const Leaf numbers = node->leaf();
+      for (std::int64_t i = 0; i < numbers.count; ++i) missing.push_back(numbers.at(i));
+    }
+  }
+  if (missing.size() > static_cast<std::size_t>(maxMissing))
+    field.refuse("has more than " + std::to_string(maxMissing) + " numbers for missing values");
+  return missing;
+}
+
 /// Whether the distance from one component to the next is the same everywhere.
 bool evenlySpaced(const std::vector<Leaf>& components) {
   const Leaf& first = components.front();
@@ -215,7 +231,7 @@ bool operator==(const vdi_catalyst_strides& left, const vdi_catalyst_strides& ri
 
 bool sameArray(const Grid::Array& left, const Grid::Array& right) {
   const auto equal = [](const auto& one, const auto& other) { return one == other; };
-  return left.type == right.type && left.data == right.data &&
+  return left.type == right.type && left.data == right.data && left.missing == right.missing &&
          std::ranges::equal(left.strides, right.strides, equal);
 }
 
@@ -300,6 +316,9 @@ void Grid::addField(const Node& field, const vdi_catalyst_block& block) {
   // An array must have one type and be in each block; read() takes out the others.
   if (array.data.size() + 1 != blocks_.size() || (!array.data.empty() && array.type != leaf.type)) return;
   array.type = leaf.type;
+  for (const double number : missingOf(field)) {
+    if (std::ranges::find(array.missing, number) == array.missing.end()) array.missing.push_back(number);
+  }
   array.data.push_back(first + elements.first * stride);
   array.strides.push_back(strides);
 }

@@ -25,6 +25,7 @@ class Grid {
     std::int32_t type = VDI_CATALYST_F64;
     std::vector<const void*> data;              // one for each block
     std::vector<vdi_catalyst_strides> strides;  // one for each block
+    std::vector<double> missing;                // numbers that stand for missing values in any block
   };
 
   /// Replaces blocks and arrays by those of `data`: a domain, or any number of domains in lists or objects.

@@ -236,9 +236,15 @@ int Session::setArrays() {
     const auto& [association, components, name] = key;
     const auto own = grid_.arrays().find(key);
     const bool isHere = own != grid_.arrays().end();
-    const int code = vdi_catalyst_set_array_strided(
+    int code = vdi_catalyst_set_array_strided(
         catalyst_, name.c_str(), isHere ? own->second.type : type, association, components,
         isHere ? own->second.data.data() : nullptr, isHere ? own->second.strides.data() : nullptr);
+    if (code == VDI_CATALYST_OK) {
+      code =
+          vdi_catalyst_set_array_missing(catalyst_, name.c_str(), association,
+                                         isHere ? static_cast<std::int32_t>(own->second.missing.size()) : 0,
+                                         isHere ? own->second.missing.data() : nullptr);
+    }
     if (code != VDI_CATALYST_OK) return code;
   }
   return VDI_CATALYST_OK;

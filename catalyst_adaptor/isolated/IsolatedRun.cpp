@@ -425,7 +425,8 @@ StepFields IsolatedRun::fieldsOf(bool namedAlone) const {
   StepFields all;
   all.arrays = self_.fields.arrays();
   for (const auto& [name, particles] : self_.fields.particles())
-    all.particles.push_back({name, particles, self_.fields.offsetOf(name, true)});
+    all.particles.push_back(
+        {name, particles, self_.fields.offsetOf(name, true), self_.fields.missingOf(name, true)});
   if (!namedAlone) return all;
   std::vector<std::string> names{options_.run->field};
   if (options_.run->when) names.push_back(options_.run->when->field);

@@ -26,6 +26,11 @@ class Packer {
     const auto* from = reinterpret_cast<const std::byte*>(text.data());
     bytes_.insert(bytes_.end(), from, from + text.size());
   }
+  template <typename Value>
+  void putAll(const std::vector<Value>& values) {
+    put(std::uint64_t{values.size()});
+    for (const Value& value : values) put(value);
+  }
   std::span<const std::byte> bytes() const { return bytes_; }
 
  private:
@@ -47,6 +52,12 @@ class Unpacker {
   std::string takeText() {
     const auto size = take<std::uint64_t>();
     return {reinterpret_cast<const char*>(next(size)), size};
+  }
+  template <typename Value>
+  std::vector<Value> takeAll() {
+    std::vector<Value> values;
+    for (auto left = take<std::uint64_t>(); left > 0; --left) values.push_back(take<Value>());
+    return values;
   }
 
  private:

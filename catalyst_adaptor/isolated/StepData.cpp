@@ -76,12 +76,14 @@ class Placement {
     head_.put(std::int32_t{array.type});
     head_.put(std::int32_t{componentsOf(array)});
     for (int axis = 0; axis < 3; ++axis) head_.put(array.offset[axis]);
+    head_.putAll(array.missing);
     for (const StridedValues& values : array.blocks) place(values.first != nullptr, values.bytes());
   }
   void put(const StepFields::NamedParticles& particles) {
-    const auto& [name, array, offset] = particles;
+    const auto& [name, array, offset, missing] = particles;
     head_.putText(name);
     for (int axis = 0; axis < 3; ++axis) head_.put(offset[axis]);
+    head_.putAll(missing);
     head_.put(array.kind);
     head_.put(std::uint64_t{array.particles.count});
     for (const NumberColumn& column : columnsOf(array.particles)) {
@@ -123,6 +125,7 @@ class StepReader {
     array.type = take<std::int32_t>();
     array.components = take<std::int32_t>();
     for (double& offset : array.offset) offset = take<double>();
+    array.missing = head_.takeAll<double>();
     for (const vdi_catalyst_block& block : blocks) array.blocks.push_back(placed(placedBytes(block, array)));
     return array;
   }
@@ -131,6 +134,7 @@ class StepReader {
     vdi_catalyst_particles& given = particles.given;
     particles.name = head_.takeText();
     for (double& offset : particles.offset) offset = take<double>();
+    particles.missing = head_.takeAll<double>();
     given.kind = take<DepositKind>() == DepositKind::Density ? VDI_CATALYST_DENSITY : VDI_CATALYST_SUM;
     given.count = static_cast<std::int64_t>(take<std::uint64_t>());
     if (given.count < 0) throw std::runtime_error("a step has too many particles to count");

@@ -20,7 +20,8 @@ struct StepFields {
   struct NamedParticles {
     std::string name;
     ParticleArray array;
-    glm::dvec3 offset{0.0};  // the offset, in cells, of the array that the particles become
+    glm::dvec3 offset{0.0};         // the offset, in cells, of the array that the particles become
+    std::vector<double> missing{};  // the numbers that stand for its missing values
   };
   std::vector<Fields::NamedArray> arrays;
   std::vector<NamedParticles> particles;
@@ -52,11 +53,13 @@ struct StepData {
     std::int32_t type = VDI_CATALYST_F64;
     std::int32_t components = 1;
     double offset[3] = {};
+    std::vector<double> missing;
     std::vector<const void*> blocks;  // values in VTK's order; null where a block lacks the array
   };
   struct Particles {
     std::string name;
     double offset[3] = {};
+    std::vector<double> missing;
     vdi_catalyst_particles given{};
   };
   std::uint64_t version = 0;  // another number means other blocks

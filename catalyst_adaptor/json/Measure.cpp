@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <utility>
 
@@ -37,52 +37,14 @@ struct Totals {
   }
 };
 
-template <typename Scalar>
-struct Load {
-  double operator()(const std::byte* from) const {
-    Scalar value{};  // copied, because the source may be unaligned
-    std::memcpy(&value, from, sizeof value);
-    return static_cast<double>(value);
-  }
-};
-
-/// Calls `visit` with an object that loads a value of the type.
-template <typename Visit>
-void withLoad(int type, Visit visit) {
-  switch (type) {
-    case VDI_CATALYST_U8:
-      return visit(Load<std::uint8_t>());
-    case VDI_CATALYST_I8:
-      return visit(Load<std::int8_t>());
-    case VDI_CATALYST_U16:
-      return visit(Load<std::uint16_t>());
-    case VDI_CATALYST_I16:
-      return visit(Load<std::int16_t>());
-    case VDI_CATALYST_U32:
-      return visit(Load<std::uint32_t>());
-    case VDI_CATALYST_I32:
-      return visit(Load<std::int32_t>());
-    case VDI_CATALYST_F32:
-      return visit(Load<float>());
-    case VDI_CATALYST_I64:
-      return visit(Load<std::int64_t>());
-    case VDI_CATALYST_U64:
-      return visit(Load<std::uint64_t>());
-    default:
-      return visit(Load<double>());
-  }
-}
-
 }  // namespace
 
-/// Visits the values of a part.
+/// Totals over the values of a part.
 class Sweep {
  public:
-  Sweep(const Measure::OwnedPart& part, const StridedValues& values, int component)
-      : part_(part), values_(values), component_(values.components > 1 ? component : 0) {}
+  Sweep(const Measure::OwnedPart& part, const Block& block) : part_(part), block_(block) {}
 
-  template <typename Loader>
-  Totals run(Loader load) const {
+  Totals run() const {
     Totals all;
     std::mutex mutex;
     const std::size_t rows = part_.extents[1].size();
@@ -91,8 +53,11 @@ class Sweep {
     constexpr std::size_t values = 100000;  // these take some 100 us
     inParallel(slices, std::max<std::size_t>(1, values / slice), [&](std::size_t first, std::size_t last) {
       Totals mine;
+      TileBuffer buffer;
       for (std::size_t k = first; k < last; ++k) {
-        for (std::size_t j = 0; j < rows; ++j) mine.take(row(load, j, k));
+        const IndexBox sliceBox = boxOf(k);
+        const Tiling tiles = block_.tilesOf(sliceBox);
+        for (std::size_t i = 0; i < tiles.count(); ++i) take(tiles[i], buffer, mine);
       }
       const std::scoped_lock lock(mutex);
       all.take(mine);
@@ -101,34 +66,30 @@ class Sweep {
   }
 
  private:
-  template <typename Loader>
-  Totals row(Loader load, std::size_t j, std::size_t k) const {
-    const std::byte* at = values_.first + part_.first[0] * values_.strides[0] +
-                          (part_.first[1] + static_cast<std::int64_t>(j)) * values_.strides[1] +
-                          (part_.first[2] + static_cast<std::int64_t>(k)) * values_.strides[2];
-    const double area = part_.extents[1][j] * part_.extents[2][k];
-    Totals totals;
-    for (const double length : part_.extents[0]) {
-      totals.take(valueAt(load, at), length * area);
-      at += values_.strides[0];
-    }
-    return totals;
+  IndexBox boxOf(std::size_t slice) const {
+    const glm::ivec3 lo = part_.first + glm::ivec3(0, 0, static_cast<int>(slice));
+    const glm::ivec3 size(part_.extents[0].size(), part_.extents[1].size(), 1);
+    return {lo, lo + size};
   }
-  template <typename Loader>
-  double valueAt(Loader load, const std::byte* at) const {
-    if (component_ >= 0) return load(at + component_ * values_.componentStride);
-    if (component_ == phase) return std::atan2(load(at + values_.componentStride), load(at));
-    double squares = 0.0;
-    for (int c = 0; c < values_.components; ++c) {
-      const double value = load(at + c * values_.componentStride);
-      squares += value * value;
-    }
-    return std::sqrt(squares);
+  void take(const IndexBox& tile, TileBuffer& buffer, Totals& totals) const {
+    block_.copyTo(tile, buffer.bytes.data());
+    const auto extent = [&](int axis, int index) {
+      return part_
+          .extents[static_cast<std::size_t>(axis)][static_cast<std::size_t>(index - part_.first[axis])];
+    };
+    withTyped(block_.type, static_cast<const void*>(buffer.bytes.data()), [&](const auto* values) {
+      for (int z = tile.lo.z; z < tile.hi.z; ++z) {
+        for (int y = tile.lo.y; y < tile.hi.y; ++y) {
+          const double area = extent(1, y) * extent(2, z);
+          for (int x = tile.lo.x; x < tile.hi.x; ++x)
+            totals.take(static_cast<double>(*values++), extent(0, x) * area);
+        }
+      }
+    });
   }
 
   const Measure::OwnedPart& part_;
-  const StridedValues& values_;
-  int component_;  // or magnitude, or phase
+  const Block& block_;
 };
 
 /// The part of a block; nullopt if it owns no value. A value stands for the cell or point beside which its
@@ -145,7 +106,7 @@ std::optional<Measure::OwnedPart> Measure::partOf(std::size_t index, const Block
       const double extent = std::min(middle + 0.5 * spacing, block.owned.hi[axis]) -
                             std::max(middle - 0.5 * spacing, block.owned.lo[axis]);
       if (!(extent > least * spacing)) continue;
-      if (extents.empty()) part.first[static_cast<std::size_t>(axis)] = i;
+      if (extents.empty()) part.first[axis] = i;
       extents.push_back(extent);
     }
     if (extents.empty()) return std::nullopt;
@@ -155,14 +116,14 @@ std::optional<Measure::OwnedPart> Measure::partOf(std::size_t index, const Block
 
 void Measure::findParts(const comm::Communicator& comm, const Fields& fields, bool cells) {
   std::vector<Block> places;
-  std::vector<std::pair<std::size_t, glm::dvec3>> sources;
-  const auto indexOf = [&](const Block& place) {
-    return static_cast<std::size_t>(static_cast<const vdi_catalyst_block*>(place.data) -
-                                    fields.blocks().data());
-  };
+  std::vector<std::pair<const void*, glm::dvec3>> sources;
+  std::map<const void*, std::size_t> numbers;  // among the blocks that have the array
   const bool areNew = comm.anyTogether([&] {
     places = fields.placesOf(condition_.field, cells);
-    for (const Block& place : places) sources.emplace_back(indexOf(place), place.origin);
+    for (const Block& place : places) {
+      numbers.emplace(place.data, numbers.size());
+      sources.emplace_back(place.data, place.origin);
+    }
     return version_ != fields.version() || cells_ != cells || sources_ != sources;
   });
   if (!areNew) return;
@@ -171,7 +132,7 @@ void Measure::findParts(const comm::Communicator& comm, const Fields& fields, bo
   comm.together([&] {
     parts_.clear();
     for (const Block& place : places) {
-      std::optional<OwnedPart> part = partOf(indexOf(place), place);
+      std::optional<OwnedPart> part = partOf(numbers.at(place.data), place);
       if (part) parts_.push_back(std::move(*part));
     }
   });
@@ -185,13 +146,9 @@ std::optional<double> Measure::of(const comm::Communicator& comm, const Fields& 
   findParts(comm, fields, cells);
   Totals totals;
   comm.together([&] {
-    const Fields::Values values = fields.valuesOf(condition_.field, cells, condition_.component);
-    withLoad(values.type, [&](auto load) {
-      for (const OwnedPart& part : parts_) {
-        const Sweep sweep(part, values.blocks[part.block], condition_.component);
-        totals.take(sweep.run(load));
-      }
-    });
+    const std::vector<Block> blocks =
+        fields.blocksOf(condition_.field, cells, condition_.component, missing_);
+    for (const OwnedPart& part : parts_) totals.take(Sweep(part, blocks[part.block]).run());
   });
   using Kind = config::RunCondition::Measure;
   if (condition_.measure == Kind::Max || condition_.measure == Kind::Min) {

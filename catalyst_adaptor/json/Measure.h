@@ -14,37 +14,40 @@
 
 namespace vdi::catalyst {
 
-/// Reads values of any type and order where they are, and copies none. Each place counts once: ghost layers
-/// and values that finer blocks cover are left out. A mean weights each value by the volume that it
+/// Reads values of any type and order where they are. Missing ones don't count. Each place counts once: ghost
+/// layers and values that finer blocks cover are left out. A mean weights each value by the volume that it
 /// represents within its block's owned part. A point on a face between two blocks therefore counts
 /// half in each. Values of staggered grids count like those of their cells or points.
 class Measure {
  public:
-  explicit Measure(config::RunCondition condition) : condition_(std::move(condition)) {}
+  /// `missing` are numbers that stand for missing values, beside the array's own.
+  explicit Measure(config::RunCondition condition, std::vector<double> missing = {})
+      : condition_(std::move(condition)), missing_(std::move(missing)) {}
   const config::RunCondition& condition() const { return condition_; }
 
   /// Collective: the maximum or minimum, or the mean for Mean and Change; nullopt if no value counts. Throws
-  /// on all ranks as agreeOnCells and Fields::valuesOf do.
+  /// on all ranks as agreeOnCells and Fields::blocksOf do.
   std::optional<double> of(const comm::Communicator& comm, const Fields& fields);
 
  private:
   /// The part of a block that it owns: along each axis, the length of each value's extent that lies in it, in
   /// world units.
   struct OwnedPart {
-    std::size_t block = 0;
-    std::array<std::int64_t, 3> first{};  // indices of values
+    std::size_t block = 0;  // its number among the blocks that have the array
+    glm::ivec3 first{0};    // indices of values
     std::array<std::vector<double>, 3> extents;
   };
   static std::optional<OwnedPart> partOf(std::size_t index, const Block& block);
   void findParts(const comm::Communicator& comm, const Fields& fields, bool cells);
 
   config::RunCondition condition_;
+  std::vector<double> missing_;
   std::vector<OwnedPart> parts_;
-  /// The blocks whose parts these are: their version, kind of values, and each one's index and place of its
+  /// The blocks whose parts these are: their version, kind of values, and each one's address and place of its
   /// first value.
   std::optional<std::uint64_t> version_;
   bool cells_ = false;
-  std::vector<std::pair<std::size_t, glm::dvec3>> sources_;
+  std::vector<std::pair<const void*, glm::dvec3>> sources_;
 
   friend class Sweep;
 };

@@ -25,6 +25,7 @@
 #include "vdi/config/Schedule.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
+#include "vdi/core/SamplingRate.h"
 #include "vdi/core/UnitDistance.h"
 #include "vdi/gpu/Device.h"
 #include "vdi/gpu/DeviceRequest.h"
@@ -123,7 +124,7 @@ struct RunEngine::State {
         schedule(run),
         wallTimeShare(run.maxShare),
         hostMemory(run.maxHostMiB) {
-    if (run.when) measure.emplace(*run.when);
+    if (run.when) measure.emplace(*run.when, run.missing);
   }
 
   /// Collective: makes the device and the objects that need one. After a failure, no rank has them.
@@ -487,7 +488,7 @@ void RunEngine::prepare(Fields& fields, std::int64_t step, double time) {
   std::vector<Block> blocks;
   std::array<double, 2> largest{};  // the most values per unit of volume, and the most components
   comm.together([&] {
-    blocks = fields.blocksOf(run_.field, cells, run_.component);
+    blocks = fields.blocksOf(run_.field, cells, run_.component, run_.missing);
     for (Block& block : blocks) {
       largest[0] = std::max(largest[0], 1.0 / (block.spacing.x * block.spacing.y * block.spacing.z));
       block.nearest = run_.settings.interpolation == Interpolation::Nearest;
@@ -499,7 +500,10 @@ void RunEngine::prepare(Fields& fields, std::int64_t step, double time) {
   VdiGenerator& generator = *state.generator;
   generator.setBlocks(std::move(blocks));
   const ScalarRange range = generator.scalarRange();
-  if (!state.firstRange && range.min < range.max) state.firstRange = range;
+  if (!state.firstRange && range.min < range.max) {
+    state.firstRange = range;
+    comm.together([&] { noteRange(range); });
+  }
   const double voxelVolume = largest[0] > 0.0 ? 1.0 / largest[0] : 0.0;
   const int components = static_cast<int>(largest[1]);
   LoadedFrame frame;
@@ -520,6 +524,15 @@ void RunEngine::prepare(Fields& fields, std::int64_t step, double time) {
                     .component = components > 1 ? run_.component : 0}};
   });
   state.frame = std::move(frame);
+}
+
+/// Says that the first frame's range, by which all frames are coloured, is much wider than its values.
+void RunEngine::noteRange(const ScalarRange& range) const {
+  if (run_.colors.range || !state_->isRoot()) return;
+  if (const std::optional<ScalarRange> part = state_->generator->crowdedPart()) {
+    std::fprintf(stderr, "vdi_catalyst: field '%s': %s (\"range\" of \"colors\", \"missing\")\n",
+                 run_.field.c_str(), describeCrowded(range, *part).c_str());
+  }
 }
 
 void RunEngine::deliver(const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record) {

@@ -73,6 +73,7 @@ class RunEngine {
   template <typename Work>
   void tryTwice(Work work);
   void prepare(Fields& fields, std::int64_t step, double time);
+  void noteRange(const ScalarRange& range) const;
   void deliver(const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record);
   void save(Vdi vdi, const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record);
   void writePictures(const Vdi& vdi, const config::RunCamera& camera, runlog::FrameRecord& record);

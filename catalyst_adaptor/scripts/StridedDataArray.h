@@ -11,9 +11,13 @@
 #include <cstddef>
 #include <cstring>
 #include <glm/glm.hpp>
+#include <limits>
 #include <mutex>
 #include <optional>
+#include <span>
+#include <type_traits>
 #include <typeinfo>
+#include <vector>
 
 #include "catalyst_adaptor/StridedArray.h"
 #include "plugin/VolumetricDepthImages/StridedSource.h"
@@ -34,9 +38,11 @@ class StridedDataArray : public vtkGenericDataArray<StridedDataArray<T>, T>, pub
   static Self* New() { VTK_STANDARD_NEW_BODY(Self); }
 
   /// `values` must be reachable, and stay where they are while this object exists. `offset` is in cells.
-  void set(const StridedValues& values, const glm::dvec3& offset) {
+  /// Floating-point values that equal one of `missing`, rounded to T, read as NaN.
+  void set(const StridedValues& values, const glm::dvec3& offset, const std::vector<double>& missing) {
     values_ = values;
     offset_ = offset;
+    missing_ = missing;
     this->SetNumberOfComponents(values.components);
     this->Size = static_cast<vtkIdType>(values.scalars());
     this->MaxId = this->Size - 1;
@@ -44,11 +50,9 @@ class StridedDataArray : public vtkGenericDataArray<StridedDataArray<T>, T>, pub
   }
 
   ComponentArray memory() const override {
-    return {values_.first,
-            {values_.strides[0], values_.strides[1], values_.strides[2]},
-            componentType(),
-            values_.components,
-            values_.componentStride};
+    return {values_.first,           {values_.strides[0], values_.strides[1], values_.strides[2]},
+            componentType(),         values_.components,
+            values_.componentStride, missing_};
   }
   glm::ivec3 counts() const override { return {values_.counts[0], values_.counts[1], values_.counts[2]}; }
   glm::dvec3 offset() const override { return offset_; }
@@ -56,15 +60,17 @@ class StridedDataArray : public vtkGenericDataArray<StridedDataArray<T>, T>, pub
   T GetTypedComponent(vtkIdType tuple, int component) const {
     T value{};
     std::memcpy(&value, addressOf(tuple) + component * values_.componentStride, sizeof value);
-    return value;
+    return unlessMissing(value);
   }
   T GetValue(vtkIdType index) const {
     return GetTypedComponent(index / values_.components, static_cast<int>(index % values_.components));
   }
   void GetTypedTuple(vtkIdType tuple, T* to) const {
     const std::byte* const from = addressOf(tuple);
-    for (int c = 0; c < values_.components; ++c)
+    for (int c = 0; c < values_.components; ++c) {
       std::memcpy(to + c, from + c * values_.componentStride, sizeof(T));
+      to[c] = unlessMissing(to[c]);
+    }
   }
   void SetTypedComponent(vtkIdType, int, T) { refuse(); }
   void SetValue(vtkIdType, T) { refuse(); }
@@ -73,11 +79,16 @@ class StridedDataArray : public vtkGenericDataArray<StridedDataArray<T>, T>, pub
   void* GetVoidPointer(vtkIdType index) override {
     const auto bytes = static_cast<std::ptrdiff_t>(index) * static_cast<std::ptrdiff_t>(sizeof(T));
     // VTK's signature. Its filters only read through this pointer.
-    if (values_.inOrder()) return const_cast<std::byte*>(values_.first) + bytes;
+    const bool readAsTheyAre = missing_.empty() || !std::is_floating_point_v<T>;
+    if (values_.inOrder() && readAsTheyAre) return const_cast<std::byte*>(values_.first) + bytes;
     const std::scoped_lock lock(copying_);
     if (!copy_) copy_.emplace(values_);
     if (copied_ < this->GetMTime()) {
       copy_->gather();
+      if (!readAsTheyAre) {
+        for (T& value : std::span(static_cast<T*>(copy_->data()), static_cast<std::size_t>(this->Size)))
+          value = unlessMissing(value);
+      }
       copied_ = this->GetMTime();
     }
     return static_cast<std::byte*>(copy_->data()) + bytes;
@@ -104,6 +115,14 @@ class StridedDataArray : public vtkGenericDataArray<StridedDataArray<T>, T>, pub
     return values_.first + tuple % values_.counts[0] * values_.strides[0] +
            row % values_.counts[1] * values_.strides[1] + row / values_.counts[1] * values_.strides[2];
   }
+  T unlessMissing(T value) const {
+    if constexpr (std::is_floating_point_v<T>) {
+      for (const double missing : missing_) {
+        if (value == static_cast<T>(missing)) return std::numeric_limits<T>::quiet_NaN();
+      }
+    }
+    return value;
+  }
   static constexpr ComponentType componentType() {
     constexpr bool isInteger = std::is_integral_v<T>;
     constexpr bool isSigned = std::is_signed_v<T>;
@@ -122,6 +141,7 @@ class StridedDataArray : public vtkGenericDataArray<StridedDataArray<T>, T>, pub
 
   StridedValues values_;
   glm::dvec3 offset_{0.0};
+  std::vector<double> missing_;
   mutable std::mutex copying_;
   std::optional<StridedArray> copy_;
   vtkMTimeType copied_ = 0;

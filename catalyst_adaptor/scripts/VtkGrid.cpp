@@ -75,14 +75,14 @@ auto withNumber(int type, Visit visit) {
 vtkSmartPointer<vtkDataArray> newArray(const Fields::NamedArray& named, const StridedValues& values) {
   vtkSmartPointer<vtkDataArray> array;
   withNumber(named.type, [&]<typename Number>(Number /*zero*/) {
-    if (values.inOrder() && named.offset == glm::dvec3(0.0)) {
+    if (values.inOrder() && named.offset == glm::dvec3(0.0) && named.missing.empty()) {
       array.TakeReference(vtkDataArray::CreateDataArray(vtkTypeTraits<Number>::VTK_TYPE_ID));
       array->SetNumberOfComponents(values.components);
       // VTK only reads through this pointer. `save` = 1 leaves the memory to its owner.
       array->SetVoidArray(const_cast<std::byte*>(values.first), static_cast<vtkIdType>(values.scalars()), 1);
     } else {
       const auto strided = vtkSmartPointer<StridedDataArray<Number>>::New();
-      strided->set(values, named.offset);
+      strided->set(values, named.offset, named.missing);
       array = strided;
     }
   });

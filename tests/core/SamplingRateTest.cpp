@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -139,4 +140,24 @@ TEST_CASE("sampling rate: every decomposition has the same probes") {
   }
   CHECK(equal);
   CHECK(worst < 1e-9);
+}
+
+TEST_CASE("a range that most values fill little of") {
+  const auto crowded = [](double low, double high, const std::function<double(std::size_t)>& valueOf) {
+    std::vector<Probe> probes(1000);
+    for (std::size_t i = 0; i < probes.size(); ++i) probes[i].value = valueOf(i);
+    return crowdedPart({low, high}, probes);
+  };
+  const auto part = crowded(0.0, 1e20, [](std::size_t i) { return i % 200 == 0 ? 1e20 : double(i % 97); });
+  REQUIRE(part.has_value());
+  CHECK(part->min >= 0.0);
+  CHECK(part->max <= 96.0);
+  CHECK(describeCrowded({0.0, 1e20}, *part).find("1e+20") != std::string::npos);
+  // Fill values at an end of the range, however many they are.
+  CHECK(crowded(-9999.0, 30.0, [](std::size_t i) { return i % 3 == 0 ? -9999.0 : double(i % 30); }));
+  CHECK(crowded(-5.0, 65535.0, [](std::size_t i) { return i % 3 == 0 ? 65535.0 : double(i % 30); }));
+  CHECK_FALSE(crowded(0.0, 255.0, [](std::size_t i) { return double(i % 256); }));
+  CHECK_FALSE(crowded(0.0, 1.0, [](std::size_t i) { return double(i % 2); }));             // a mask
+  CHECK_FALSE(crowded(0.0, 1.0, [](std::size_t i) { return i % 500 == 0 ? 1.0 : 0.0; }));  // an object in air
+  CHECK_FALSE(crowded(0.0, 1.0, [](std::size_t) { return std::numeric_limits<double>::quiet_NaN(); }));
 }

@@ -203,4 +203,53 @@ TEST_CASE("components are shown as they are, or as doubles that are computed") {
     showComponent(block, arrayOf(large, dims, 1, ComponentType::U64), magnitude);
     CHECK(storedValueAt(block, {1, 1, 1}) == 0x1p64);
   }
+  SECTION("of which some are missing") {
+    std::vector<std::int16_t> values(count);
+    for (std::size_t i = 0; i < count; ++i)
+      values[i] = static_cast<std::int16_t>(i % 3 == 0 ? -9999 : 1 + i % 500);
+    ComponentArray array = arrayOf(values, dims, 1, ComponentType::I16);
+    array.missing = {-9999.0, 0.5, 1e20};
+    showComponent(block, array, magnitude);
+    CHECK(block.type == ScalarType::F32);
+    std::vector<float> seen(part.count());
+    block.copyTo(part, seen.data());
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      const glm::ivec3 size = part.size();
+      const glm::ivec3 at(i % size.x, i / size.x % size.y, i / (size.x * size.y));
+      const std::int16_t value = values[block.stored().position(part.lo + at)];
+      REQUIRE((value == -9999 ? std::isnan(seen[i]) : seen[i] == value));
+    }
+    CHECK(ownRange(block).min == 1.0);
+    array.missing = {0.5, 40000.0};  // numbers that no value can be
+    showComponent(block, array, magnitude);
+    CHECK(block.type == ScalarType::I16);
+    CHECK(block.computed == nullptr);
+  }
+  SECTION("of vectors that lack components") {
+    std::vector<double> values(2 * count, 3.0);
+    values[2 * 5 + 1] = 1e20;
+    ComponentArray array = arrayOf(values, dims, 2, ComponentType::F64);
+    array.missing = {1e20};
+    for (const int component : {1, magnitude, phase}) {
+      showComponent(block, array, component);
+      CHECK(std::isnan(storedValueAt(block, {5, 0, 0})));
+      CHECK(std::isfinite(storedValueAt(block, {4, 0, 0})));
+    }
+    showComponent(block, array, 0);
+    CHECK(storedValueAt(block, {5, 0, 0}) == 3.0);
+  }
+  SECTION("with a block's own values, in single precision and of 64 bits") {
+    const std::vector<float> values{1.0F, 0.1F, 1e20F, 4.0F};
+    Block line =
+        Block::fromCells({4, 1, 1}, glm::dvec3(0.0), glm::dvec3(1.0), ScalarType::F32, values.data());
+    leaveOutMissing(line, std::array{0.1, 1e20});  // neither is a float
+    CHECK(ownRange(line) == ScalarRange{1.0, 4.0});
+    CHECK(std::isnan(storedValueAt(line, {2, 0, 0})));
+    const std::vector<std::int64_t> wide{std::numeric_limits<std::int64_t>::min(), 7, -9999,
+                                         std::numeric_limits<std::int64_t>::max()};
+    ComponentArray array = arrayOf(wide, {4, 1, 1}, 1, ComponentType::I64);
+    array.missing = {-9999.0, -0x1p63, 0x1p63};
+    showComponent(line, array, magnitude);
+    CHECK(ownRange(line) == ScalarRange{7.0, 7.0});
+  }
 }

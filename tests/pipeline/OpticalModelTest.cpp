@@ -65,3 +65,33 @@ TEST_CASE("optical model: parallel projection, and data of cells") {
   checkAll(test::stretches[3], Joint::Cells, false, true);
   checkAll(test::stretches[7], Joint::Cells, true, true);
 }
+
+TEST_CASE("optical model: missing values of all types are clear, with all that is interpolated with them") {
+  const auto joint = GENERATE(Joint::SharedPoints, Joint::Cells);
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  for (const test::Stretch& stretch : test::stretches) {
+    const double fill = test::fills[static_cast<std::size_t>(stretch.type)];
+    INFO(toString(stretch.type) << (joint == Joint::Cells ? ", cells" : ""));
+    const test::NamedFunction named = test::namedFunctions(stretch)[0];
+    const Camera camera = test::lookingAt(false);
+    const GenerateSettings settings = test::opticalSettings(8.0);
+    const test::OpticalScene scene =
+        test::opticalScene(stretch, joint, glm::ivec3(2), synthetic::Layout::OnOneRank, 0, 1, fill);
+    generator.setBlocks(scene.mine);
+    CHECK(generator.scalarRange().min >= stretch.low);
+    CHECK(generator.scalarRange().max <= stretch.high);
+    const Image expected =
+        reference::renderExactly(scene.whole, named.function, camera, settings.width, settings.height);
+    const Image all = reference::renderExactly(test::opticalScene(stretch, joint).whole, named.function,
+                                               camera, settings.width, settings.height);
+    REQUIRE(test::offBetween(all, expected).largest > 30.0);
+    // A sample at the edge of missing values is off by up to half of its length.
+    const Bound bound{3.0, 0.3, 0.0};
+    checkPicture(*generator.renderVolume(camera, named.function, settings), expected, named, bound);
+    checkPicture(flatten(*generator.generate(camera, named.function, settings)), expected, named,
+                 {bound.largest + 0.5, bound.mean + 0.1, bound.pixels});
+    const std::vector<Block> blocks = comm::exchangeGhosts(comm::Communicator::serial(), scene.mine);
+    const reference::RayInputs inputs(generator.scene(), camera, named.function, settings);
+    checkPicture(reference::renderVolume(inputs, blocks), expected, named, bound);
+  }
+}

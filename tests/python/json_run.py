@@ -230,6 +230,43 @@ def check_levels():
     assert len(distances) == 1, distances
 
 
+def check_missing():
+    """Masked arrays, `missing` of an array and of a run: the VDI and the range of NaN, whatever the type."""
+    whole = np.round(40 * np.sin(5 * x)[:, None, None] * np.cos(4 * x)[None, :, None] * np.ones(N) + 50)
+    hole = np.zeros(whole.shape, bool)
+    hole[4:9, 2:13, 5:11] = True
+
+    def shown(values, missing=None, run_missing=(), change=lambda: None):
+        run = {"field": "V", "resolution": [48, 32], "output": "missing_{timestep}.vdi", "existing": "overwrite",
+               "missing": list(run_missing), "when": {"max": "V", "below": 100}}
+        with Catalyst(MPI.COMM_WORLD, json=run) as catalyst:
+            catalyst.set_blocks([Block(cells=(N, N, N), spacing=(1 / N,) * 3)])
+            catalyst.set_array("V", [values], missing=missing)
+            change()
+            assert not os.path.exists("missing_7.vdi")
+            catalyst.execute(7)
+        made = pv_vdi.read("missing_7.vdi")
+        os.remove("missing_7.vdi")
+        assert made.metadata["range"] == [whole[~hole].min(), whole[~hole].max()], made.metadata["range"]
+        return made
+
+    expected = shown(np.where(hole, np.nan, whole)).segments
+    for kind, fill in (("uint8", 255), ("float32", 1e20), ("int64", 2 ** 40)):
+        filled = np.where(hole, fill, whole).astype(kind)
+        named = shown(filled, run_missing=[-1.5, fill]).segments
+        assert len(named) == len(expected), kind
+        assert (shown(np.ma.masked_equal(filled, fill)).segments == named).all(), kind
+    assert (shown(np.where(hole, 1e20, whole), missing=1e20).segments == expected).all()
+    # Masks and values that change after set_array count as they are at execute.
+    masked = np.ma.masked_array(np.zeros_like(whole), np.zeros_like(hole))
+
+    def change():
+        masked.data[...] = np.where(hole, 1e20, whole)
+        masked.mask[...] = hole
+
+    assert (shown(masked, change=change).segments == expected).all()
+
+
 refused(SCRIPT, "no such field", json={"field": "V", "evry": 10})
 refused(SCRIPT, "none.json", json="none.json")
 run = {"field": "V", "every": 10, "resolution": [48, 32], "stream": {"link_file": "link"},
@@ -270,6 +307,7 @@ check_kept()
 check_levels()
 check_lost()
 check_threads()
+check_missing()
 
 # Particles: one array or three, of any stride, weights and lengths for each or for all.
 places = np.random.default_rng(3).uniform(0.2, 0.8, (2000, 3))

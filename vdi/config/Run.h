@@ -97,8 +97,9 @@ struct RunCinema {
 
 struct Run {
   std::string field;
-  std::optional<bool> cells;  // none: as the simulation hands the field over
-  int component = -1;         // of a vector field: a component, magnitude or phase (ComponentValues.h)
+  std::optional<bool> cells;    // none: as the simulation hands the field over
+  int component = -1;           // of a vector field: a component, magnitude or phase (ComponentValues.h)
+  std::vector<double> missing;  // numbers that stand for missing values in all fields
   /// A frame is made when any of these three is due (Schedule), if `when` holds at that step.
   std::int64_t every = 1;              // due at multiples of this step; 0: none
   std::optional<double> everyTime;     // period in the simulation's time

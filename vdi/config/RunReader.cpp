@@ -225,6 +225,14 @@ std::string arrayNameOf(const JsonValue& value) {
   return name;
 }
 
+std::vector<double> missingOf(const JsonValue& value) {
+  constexpr std::size_t most = 64;
+  std::vector<double> missing;
+  for (const JsonValue& item : value.items()) missing.push_back(item.number());
+  if (missing.size() > most) value.fail(fmt::format("at most {} numbers may stand for missing values", most));
+  return missing;
+}
+
 RunCondition conditionOf(const JsonValue& value) {
   using Measure = RunCondition::Measure;
   value.requireObject(fieldsOf("/when"));
@@ -472,9 +480,10 @@ void readSettings(const JsonValue& document, GenerateSettings& settings) {
 /// The fields of the whole document.
 std::vector<std::string> documentFields() {
   std::vector<std::string> fields{
-      "$schema", "field",     "association",    "component",    "every",    "every_time", "every_seconds",
-      "when",    "max_share", "max_device_mib", "max_host_mib", "existing", "camera",     "cameras",
-      "orbit",   "colors",    "resolution",     "output",       "stream",   "log",        "isolation"};
+      "$schema",    "field",         "association", "component", "missing",        "every",
+      "every_time", "every_seconds", "when",        "max_share", "max_device_mib", "max_host_mib",
+      "existing",   "camera",        "cameras",     "orbit",     "colors",         "resolution",
+      "output",     "stream",        "log",         "isolation"};
   for (const Setting& setting : settingsTable()) fields.emplace_back(setting.key);
   return fields;
 }
@@ -507,6 +516,7 @@ Run parseRun(std::string_view text, const std::string& name) {
   run.field = arrayNameOf(document.at("field"));
   ifThere(document, "association", [&](const JsonValue& value) { run.cells = areCells(value); });
   ifThere(document, "component", [&](const JsonValue& value) { run.component = componentOf(value); });
+  ifThere(document, "missing", [&](const JsonValue& value) { run.missing = missingOf(value); });
   readTriggers(document, run);
   ifThere(document, "existing", [&](const JsonValue& value) { run.existing = existingOf(value); });
   readCameras(document, run);

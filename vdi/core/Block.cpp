@@ -298,9 +298,14 @@ void validate(std::span<const Block> blocks) {
     constexpr double maxSpacing = 1e30;
     if (!isFinite(block.spacing) || glm::any(glm::lessThan(block.spacing, glm::dvec3(minSpacing))) ||
         glm::any(glm::greaterThan(block.spacing, glm::dvec3(maxSpacing)))) {
+      const bool isSpacing =
+          isFinite(block.spacing) && glm::all(glm::greaterThan(block.spacing, glm::dvec3(0.0)));
       throw Error(ErrorCode::InvalidArgument,
-                  fmt::format("spacing must be from {} to {}, but is ({}, {}, {}); use other units of length",
-                              minSpacing, maxSpacing, block.spacing.x, block.spacing.y, block.spacing.z),
+                  fmt::format("spacing must be {}, but is ({}, {}, {}){}",
+                              isSpacing ? fmt::format("from {} to {}", minSpacing, maxSpacing)
+                                        : std::string("finite and above 0"),
+                              block.spacing.x, block.spacing.y, block.spacing.z,
+                              isSpacing ? "; use other units of length" : ""),
                   context);
     }
     const bool ownsNothing = block.owned.empty();

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <cstring>
+#include <limits>
 #include <memory>
 #include <span>
+#include <type_traits>
+#include <vector>
 
 namespace vdi {
 
@@ -20,91 +22,135 @@ ScalarType scalarTypeOf(ComponentType type) {
   return static_cast<ScalarType>(type);
 }
 
-template <typename T>
-double load(const void* data, std::size_t index) {
-  T value{};
-  std::memcpy(&value, static_cast<const std::byte*>(data) + index * sizeof value, sizeof value);
-  return static_cast<double>(value);
+/// Calls `visit` with a zero of the type.
+template <typename Visit>
+auto withZero(ComponentType type, Visit visit) {
+  switch (type) {
+    case ComponentType::U8:
+      return visit(std::uint8_t{});
+    case ComponentType::I8:
+      return visit(std::int8_t{});
+    case ComponentType::U16:
+      return visit(std::uint16_t{});
+    case ComponentType::I16:
+      return visit(std::int16_t{});
+    case ComponentType::U32:
+      return visit(std::uint32_t{});
+    case ComponentType::I32:
+      return visit(std::int32_t{});
+    case ComponentType::F32:
+      return visit(float{});
+    case ComponentType::I64:
+      return visit(std::int64_t{});
+    case ComponentType::U64:
+      return visit(std::uint64_t{});
+    case ComponentType::F64:
+      break;
+  }
+  return visit(double{});
 }
 
-/// Computes magnitudes, phases and 64-bit components as doubles, a tile at a time.
+/// The missing numbers that components of the type can equal, as doubles that equal them exactly.
+std::vector<double> occurringIn(ComponentType type, std::span<const double> missing) {
+  return withZero(type, [&]<typename T>(T /*zero*/) {
+    using Limits = std::numeric_limits<T>;
+    std::vector<double> occurring;
+    for (const double number : missing) {
+      if (std::isinf(number) && std::is_floating_point_v<T>) occurring.push_back(number);
+      // As a double, the largest 64-bit integer is rounded up by 1, and that is what a component becomes too.
+      if (!(number >= static_cast<double>(Limits::lowest()) && number <= static_cast<double>(Limits::max())))
+        continue;
+      if constexpr (std::is_floating_point_v<T>) {
+        occurring.push_back(static_cast<double>(static_cast<T>(number)));
+      } else if (number == std::trunc(number)) {
+        occurring.push_back(number);
+      }
+    }
+    return occurring;
+  });
+}
+
+/// Whether floats hold all values of the type.
+bool fitsFloats(ComponentType type) {
+  return type == ComponentType::F32 || sizeOf(type) < sizeof(float);
+}
+
+/// Computes magnitudes, phases, 64-bit components and those with missing values, a tile at a time.
 class Computation : public ComputedValues {
  public:
-  Computation(const ComponentArray& array, int component) : array_(array), component_(component) {}
+  /// `type` is F32 or F64.
+  Computation(const ComponentArray& array, int component, ScalarType type)
+      : array_(array), component_(component), type_(type) {
+    array_.missing = occurringIn(array.type, array.missing);
+  }
 
   void read(const IndexBox& box, void* to) const override {
     const Tiling tiles(box, fastestAxis(array_.strides));
-    const ByteStrides strides = packedStrides(box.size(), sizeof(double));
+    const std::size_t bytes = sizeOf(type_);
+    const ByteStrides strides = packedStrides(box.size(), bytes);
     for (std::size_t i = 0; i < tiles.count(); ++i) {
       const IndexBox tile = tiles[i];
-      std::array<double, Tiling::values> results;
+      Values results;
       compute(tile, std::span(results).first(tile.count()));
-      copyStrided(results.data(), packedStrides(tile.size(), sizeof(double)),
+      std::array<float, Tiling::values> narrow;
+      if (type_ == ScalarType::F32)
+        std::transform(results.begin(), results.begin() + static_cast<std::ptrdiff_t>(tile.count()),
+                       narrow.begin(), [](double value) { return static_cast<float>(value); });
+      const void* from = results.data();
+      if (type_ == ScalarType::F32) from = narrow.data();
+      copyStrided(from, packedStrides(tile.size(), bytes),
                   static_cast<std::byte*>(to) + offsetOf(tile.lo - box.lo, strides), strides, tile.size(),
-                  sizeof(double));
+                  bytes);
     }
   }
 
  private:
-  /// Calls visit(index, value) for component `c` of the tile's values.
-  template <typename Visit>
-  void forEach(const IndexBox& tile, int c, Visit visit) const {
+  using Values = std::array<double, Tiling::values>;
+
+  /// Component `c` of the tile's values, NaN where it is missing.
+  void load(const IndexBox& tile, int c, std::span<double> to) const {
     TileBuffer buffer;
     const std::size_t bytes = sizeOf(array_.type);
     copyStrided(array_.first + offsetOf(tile.lo, array_.strides) + c * array_.componentStride, array_.strides,
                 buffer.bytes.data(), packedStrides(tile.size(), bytes), tile.size(), bytes);
-    for (std::size_t i = 0; i < tile.count(); ++i)
-      visit(i, loadComponent(array_.type, buffer.bytes.data(), i));
+    withZero(array_.type, [&]<typename T>(T /*zero*/) {
+      const auto* values = reinterpret_cast<const T*>(buffer.bytes.data());
+      std::transform(values, values + to.size(), to.begin(), [](T v) { return static_cast<double>(v); });
+    });
+    // Compilers vectorise this loop, one missing number at a time.
+    for (const double missing : array_.missing) {
+      for (double& value : to) value = value == missing ? std::numeric_limits<double>::quiet_NaN() : value;
+    }
   }
 
   void compute(const IndexBox& tile, std::span<double> results) const {
+    const bool isMagnitude = component_ == magnitude && array_.components > 1;
+    load(tile, isMagnitude ? 0 : std::max(component_, 0), results);
+    if (component_ != phase && !isMagnitude) return;
+    Values others;
+    const std::span<double> other = std::span(others).first(results.size());
     if (component_ == phase) {
-      forEach(tile, 0, [&](std::size_t i, double real) { results[i] = real; });
-      forEach(tile, 1, [&](std::size_t i, double value) { results[i] = std::atan2(value, results[i]); });
-    } else if (component_ == magnitude && array_.components > 1) {
-      std::fill(results.begin(), results.end(), 0.0);
-      for (int c = 0; c < array_.components; ++c)
-        forEach(tile, c, [&](std::size_t i, double value) { results[i] += value * value; });
-      for (double& result : results) result = std::sqrt(result);
-    } else {
-      forEach(tile, std::max(component_, 0), [&](std::size_t i, double value) { results[i] = value; });
+      load(tile, 1, other);
+      for (std::size_t i = 0; i < results.size(); ++i) results[i] = std::atan2(other[i], results[i]);
+      return;
     }
+    for (double& result : results) result *= result;
+    for (int c = 1; c < array_.components; ++c) {
+      load(tile, c, other);
+      for (std::size_t i = 0; i < results.size(); ++i) results[i] += other[i] * other[i];
+    }
+    for (double& result : results) result = std::sqrt(result);
   }
 
   ComponentArray array_;
   int component_;
+  ScalarType type_;
 };
 
 }  // namespace
 
 std::size_t sizeOf(ComponentType type) {
   return isWide(type) ? sizeof(std::uint64_t) : sizeOf(scalarTypeOf(type));
-}
-
-double loadComponent(ComponentType type, const void* data, std::size_t index) {
-  switch (type) {
-    case ComponentType::U8:
-      return load<std::uint8_t>(data, index);
-    case ComponentType::I8:
-      return load<std::int8_t>(data, index);
-    case ComponentType::U16:
-      return load<std::uint16_t>(data, index);
-    case ComponentType::I16:
-      return load<std::int16_t>(data, index);
-    case ComponentType::U32:
-      return load<std::uint32_t>(data, index);
-    case ComponentType::I32:
-      return load<std::int32_t>(data, index);
-    case ComponentType::F32:
-      return load<float>(data, index);
-    case ComponentType::F64:
-      return load<double>(data, index);
-    case ComponentType::I64:
-      return load<std::int64_t>(data, index);
-    case ComponentType::U64:
-      return load<std::uint64_t>(data, index);
-  }
-  return 0.0;
 }
 
 void showComponent(Block& block, const ComponentArray& array, int component) {
@@ -114,13 +160,25 @@ void showComponent(Block& block, const ComponentArray& array, int component) {
   block.data = first;
   block.strides.reset();
   block.computed = nullptr;
-  if (isOne && !isWide(array.type)) {
+  const bool areComplete = occurringIn(array.type, array.missing).empty();
+  if (isOne && !isWide(array.type) && areComplete) {
     block.type = scalarTypeOf(array.type);
     block.setStrides(array.strides);
     return;
   }
-  block.type = ScalarType::F64;
-  block.computed = std::make_shared<Computation>(array, component);
+  block.type = isOne && fitsFloats(array.type) ? ScalarType::F32 : ScalarType::F64;
+  block.computed = std::make_shared<Computation>(array, component, block.type);
+}
+
+void leaveOutMissing(Block& block, std::span<const double> missing) {
+  assert(!block.computed);
+  const std::size_t bytes = sizeOf(block.type);
+  ComponentArray array;
+  array.first = static_cast<const std::byte*>(block.data);
+  array.strides = block.strides.value_or(packedStrides(block.dims, bytes));
+  array.type = static_cast<ComponentType>(block.type);
+  array.missing.assign(missing.begin(), missing.end());
+  showComponent(block, array, 0);
 }
 
 }  // namespace vdi

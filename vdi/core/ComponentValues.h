@@ -1,8 +1,11 @@
-// Scalars of arrays that a Block can't hold as they are: vectors, complex numbers, 64-bit integers.
+// Scalars of arrays that a Block can't hold as they are: vectors, complex numbers, 64-bit integers, and
+// arrays in which some numbers mean that a value is missing.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "vdi/core/Block.h"
 
@@ -34,17 +37,26 @@ struct ComponentArray {
   ComponentType type = ComponentType::F64;
   int components = 1;
   std::int64_t componentStride = 0;
+  /// Numbers that stand for missing values, as fill values do. A component is missing if it equals one of
+  /// them once that is rounded to the component's type; 64-bit integers are compared as doubles.
+  std::vector<double> missing{};
 };
 
 /// The size of a component.
 std::size_t sizeOf(ComponentType type);
-/// Component `index` of an array of components as double. The address may be unaligned.
-double loadComponent(ComponentType type, const void* data, std::size_t index);
 
 /// Makes the block show `component` of the array, which has a value at each of the block's places. Values are
 /// read in place, so the array must outlive the block. One component of a ScalarType is read unchanged; all
 /// else is computed as f64 at each read. `component` is a number below array.components, `magnitude`, or
 /// `phase` with two components; of a single component, `magnitude` is the component itself.
+///
+/// Missing values become NaN, which is transparent and counts in no range. So if the type has one of the
+/// array's missing numbers, one component is computed too: as f32 where floats hold all values of its type,
+/// else as f64. Magnitudes and phases are missing where a component is.
 void showComponent(Block& block, const ComponentArray& array, int component);
+
+/// Makes a block with an array of stored values show NaN where they equal one of the numbers, by the rules of
+/// showComponent. The block isn't `computed`.
+void leaveOutMissing(Block& block, std::span<const double> missing);
 
 }  // namespace vdi

@@ -1,5 +1,7 @@
 #include "vdi/core/SamplingRate.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
@@ -76,9 +78,17 @@ bool owns(const Scene& scene, const Block& block, const glm::dvec3& center) {
   return true;
 }
 
+double nearest(const Block& block, const glm::dvec3& world) {
+  const IndexBox all = block.extended();
+  const glm::dvec3 position = glm::round((world - block.origin) / block.spacing);
+  const glm::ivec3 at(glm::clamp(position, glm::dvec3(all.lo), glm::dvec3(all.hi - 1)));
+  return valueAt(block, at.x, at.y, at.z);
+}
+
 Probe probeIn(const Scene& scene, const Block& block, std::size_t index, const Place& place) {
   Probe probe;
   probe.index = index;
+  probe.value = nearest(block, scene.bounds.center() + place.center);
   for (std::size_t i = 0; i < Probe::offsets.size(); ++i) {
     const glm::dvec3 world = scene.bounds.center() + place.center + Probe::offsets[i] * place.step;
     probe.scalars[i] = interpolated(block, world);
@@ -193,6 +203,55 @@ double samplingRateFor(const TransferTable& table, const Scene& scene, const Reg
     if (showsEnough(table, slabs, scene.minSpacing, shown, rate)) return rate;
   }
   return 4.0;
+}
+
+namespace {
+
+/// The shortest part that `share` of the ascending values fill. There is at least one value.
+ScalarRange shortestPart(std::span<const double> values, double share) {
+  const auto most = static_cast<double>(values.size());
+  const auto count = std::max<std::size_t>(1, static_cast<std::size_t>(std::ceil(share * most)));
+  ScalarRange part{values.front(), values.back()};
+  for (std::size_t i = 0; i + count <= values.size(); ++i) {
+    if (values[i + count - 1] - values[i] < part.max - part.min) part = {values[i], values[i + count - 1]};
+  }
+  return part;
+}
+
+}  // namespace
+
+std::optional<ScalarRange> crowdedPart(const ScalarRange& range, std::span<const Probe> probes) {
+  constexpr double nearlyAll = 0.99;
+  constexpr double least = 1.0 / 256.0;
+  constexpr std::size_t fewest = 100;  // of fewer probes, one is more than 1 %
+  const double length = range.max - range.min;
+  std::vector<double> values;
+  for (const Probe& probe : probes) {
+    if (std::isfinite(probe.value)) values.push_back(probe.value);
+  }
+  std::ranges::sort(values);
+  const auto isCrowded = [&](const ScalarRange& part) {
+    return part.max > part.min && part.max - part.min < least * length;
+  };
+  const auto [low, high] = std::pair(std::ranges::upper_bound(values, range.min) - values.begin(),
+                                     std::ranges::lower_bound(values, range.max) - values.begin());
+  const std::span<const double> all(values);
+  for (const auto& [first, last] : {std::pair<std::ptrdiff_t, std::ptrdiff_t>{0, std::ssize(values)},
+                                    {low, std::ssize(values)},
+                                    {0, high}}) {
+    if (last - first < static_cast<std::ptrdiff_t>(fewest)) continue;
+    const std::span<const double> some =
+        all.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(last - first));
+    if (const ScalarRange part = shortestPart(some, nearlyAll); isCrowded(part)) return part;
+  }
+  return std::nullopt;
+}
+
+std::string describeCrowded(const ScalarRange& range, const ScalarRange& part) {
+  return fmt::format(
+      "the colours' automatic range is from {:.6g} to {:.6g}, but 99 % of the values that aren't at its ends "
+      "fill less than 1/256 of it, from {:.6g} to {:.6g}; set the range, or name fill values as missing",
+      range.min, range.max, part.min, part.max);
 }
 
 }  // namespace vdi

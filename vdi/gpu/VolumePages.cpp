@@ -92,8 +92,8 @@ ValueMap valueMapOf(const Block& block, std::span<const IndexBox> own) {
   if (range.min < -maximum || range.max > maximum) {
     throw Error(
         ErrorCode::InvalidArgument,
-        fmt::format("a block of {} has values from {} to {}; magnitudes beyond {} can't be handled, so "
-                    "use other units",
+        fmt::format("a block of {} has values from {} to {}; magnitudes beyond {} can't be shown: name fill "
+                    "values as missing, or mark them as NaN",
                     toString(block.type), range.min, range.max, maximum));
   }
   if (!(range.min < range.max)) return {1.0, std::isfinite(range.min) ? range.min : 0.0, false, ranges};

@@ -126,7 +126,7 @@ void TimeSteps::requireSpans(const TransferTable& table) const {
   if (!shown_.doubles || !(span > maxCount * (table.max - table.min))) return;
   throw Error(ErrorCode::InvalidArgument,
               fmt::format("the values are from {} to {}, the transfer function's from {} to {}: more than a "
-                          "factor of {}; mark missing values as NaN, not as a large number",
+                          "factor of {}; name fill values as missing, or mark them as NaN",
                           range.min, range.max, table.min, table.max, maxCount));
 }
 

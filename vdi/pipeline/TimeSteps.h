@@ -29,6 +29,9 @@ class TimeSteps {
 
   const Scene& scene() const { return shown_.scene; }             // global
   const ScalarRange& scalarRange() const { return ranges_.own; }  // global
+  /// The part of that range that nearly all values fill, if that is a small one (SamplingRate.h). Equal on
+  /// all ranks. Not collective.
+  std::optional<ScalarRange> crowdedPart() const { return vdi::crowdedPart(ranges_.own, shown_.probes); }
   /// The rate that automaticRate becomes with this transfer function and region; equal on all ranks. Not
   /// collective.
   double samplingRate(const TransferTable& table, const Region& region);

@@ -524,6 +524,9 @@ const Scene& VdiGenerator::scene() const {
 const ScalarRange& VdiGenerator::scalarRange() const {
   return state_->steps->scalarRange();
 }
+std::optional<ScalarRange> VdiGenerator::crowdedPart() const {
+  return state_->steps->crowdedPart();
+}
 const std::vector<RankReport>& VdiGenerator::reports() const {
   return state_->reports;
 }

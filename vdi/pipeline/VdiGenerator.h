@@ -59,10 +59,11 @@ class VdiGenerator {
   VdiGenerator(VdiGenerator&&) = delete;
   VdiGenerator& operator=(VdiGenerator&&) = delete;
 
-  /// Sets this rank's blocks, which may be none; copies the scalars to the device before it returns.
-  /// `fillGhosts` first fetches the layers around blocks from their neighbours, of any rank. Blocks of the
-  /// same shapes reuse device memory. Throws Error{InvalidArgument} for blocks that validate(blocks) rejects,
-  /// that overlap, or whose values are all too small for the device. After a throw, no blocks are set.
+  /// Sets this rank's blocks, which may be none; copies the scalars to the device before it returns. Points
+  /// of all ranks that lie in one plane are shown as a sheet one spacing thick. `fillGhosts` first fetches
+  /// the layers around blocks from their neighbours, of any rank. Blocks of the same shapes reuse device
+  /// memory. Throws Error{InvalidArgument} for blocks that validate(blocks) rejects, that overlap, or whose
+  /// values are all too small for the device. After a throw, no blocks are set.
   void setBlocks(std::vector<Block> blocks, bool fillGhosts = true);
 
   /// Starts to send the next time step's blocks to the device and returns, so that they arrive while frames
@@ -78,6 +79,9 @@ class VdiGenerator {
   /// The global range of finite values that blocks own. Ghost layers don't count, nor do values that finer
   /// blocks cover.
   const ScalarRange& scalarRange() const;
+  /// The part of that range that nearly all values fill, if it is less than a 256th of it (SamplingRate.h),
+  /// so that colours over the whole range would tell few values apart. Equal on all ranks.
+  std::optional<ScalarRange> crowdedPart() const;
 
   /// Returns the VDI on rank 0, nullopt on the others. Its coloring has range and function; the caller knows
   /// the array and adds it. Camera, transfer function and settings must be equal on all ranks (otherwise all

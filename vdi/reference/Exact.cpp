@@ -73,6 +73,7 @@ glm::dvec4 integrate(const ExactVolume& volume, const TransferFunction& function
   double transmittance = 1.0;
   for (int i = 0; i < samples && transmittance > 1e-9; ++i) {
     const double scalar = volume.at(from + (to - from) * ((i + 0.5) / samples));
+    if (std::isnan(scalar)) continue;  // transparent
     const double opacity = valueAt(function.opacities, &OpacityNode::opacity, scalar);
     const double passes = std::pow(1.0 - opacity, length);
     light += transmittance * (1.0 - passes) * valueAt(function.colors, &ColorNode::color, scalar);

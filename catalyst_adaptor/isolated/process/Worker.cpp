@@ -56,6 +56,7 @@ void pack(const std::vector<StepData::Array>& arrays, Packer& packer) {
     packer.put(array.type);
     packer.put(array.components);
     packer.put(array.offset);
+    packer.putAll(array.missing);
   }
 }
 
@@ -67,6 +68,7 @@ std::vector<StepData::Array> unpackArrays(Unpacker unpacker) {
     array.type = unpacker.take<std::int32_t>();
     array.components = unpacker.take<std::int32_t>();
     for (double& offset : array.offset) offset = unpacker.take<double>();
+    array.missing = unpacker.takeAll<double>();
   }
   return arrays;
 }
@@ -272,26 +274,29 @@ class Worker {
     }
     for (const StepData::Array& array : data.arrays) {
       const std::vector<vdi_catalyst_strides> strides = stridesOf(data.blocks, array);
-      code = vdi_catalyst_set_array_strided(catalyst_, array.name.c_str(), array.type,
-                                            array.cells ? VDI_CATALYST_CELLS : VDI_CATALYST_POINTS,
+      const int association = array.cells ? VDI_CATALYST_CELLS : VDI_CATALYST_POINTS;
+      code = vdi_catalyst_set_array_strided(catalyst_, array.name.c_str(), array.type, association,
                                             array.components, array.blocks.data(), strides.data());
-      if (code == VDI_CATALYST_OK) {
-        code = vdi_catalyst_set_array_offset(catalyst_, array.name.c_str(),
-                                             array.cells ? VDI_CATALYST_CELLS : VDI_CATALYST_POINTS,
-                                             array.offset);
-      }
+      if (code == VDI_CATALYST_OK) code = placeArray(array, association);
       if (code != VDI_CATALYST_OK) return code;
     }
     for (const StepData::Particles& particles : data.particles) {
       code = vdi_catalyst_set_particles(catalyst_, particles.name.c_str(), &particles.given);
-      if (code == VDI_CATALYST_OK) {
-        code = vdi_catalyst_set_array_offset(catalyst_, particles.name.c_str(), VDI_CATALYST_CELLS,
-                                             particles.offset);
-      }
+      if (code == VDI_CATALYST_OK) code = placeArray(particles, VDI_CATALYST_CELLS);
       if (code != VDI_CATALYST_OK) return code;
     }
     for (const Parameter& parameter : data.parameters) (void)inForceNow(parameter);
     return code;
+  }
+
+  /// Gives the engine the offset and the missing values of an array, or of the one that particles become.
+  template <typename Array>
+  int placeArray(const Array& array, int association) {
+    const int code = vdi_catalyst_set_array_offset(catalyst_, array.name.c_str(), association, array.offset);
+    if (code != VDI_CATALYST_OK) return code;
+    return vdi_catalyst_set_array_missing(catalyst_, array.name.c_str(), association,
+                                          static_cast<std::int32_t>(array.missing.size()),
+                                          array.missing.data());
   }
 
   /// The layout of values in order.

@@ -219,7 +219,8 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, const std::string&
   requireLength(array, choice.cells ? cells : points, name);
   requireComponent(array, choice.component);
   const glm::ivec3 counts = choice.cells ? cells : points;
-  const Memory memory = memoryOf(array, counts);
+  Memory memory = memoryOf(array, counts);
+  memory.values.missing.insert(memory.values.missing.end(), choice.missing.begin(), choice.missing.end());
   Blanking blanking = blankingOf(image, lattice, choice.cells, name);
   const void* const first = memory.values.first;
   vdi::Block block = choice.cells

@@ -18,6 +18,7 @@ struct ArrayChoice {
   bool cells = false;    // an array of cells, else of points
   int component = 0;     // or vdi::magnitude, or vdi::phase
   bool nearest = false;  // vdi::Block::nearest
+  std::vector<double> missing{};  // numbers that stand for missing values, beside those of a StridedSource
   bool operator==(const ArrayChoice&) const = default;
 };
 

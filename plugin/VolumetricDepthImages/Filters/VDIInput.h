@@ -16,7 +16,8 @@ namespace pv {
 void requestPiece(vtkInformation* info, vtkAlgorithm* filter, vtkMultiProcessController* controller);
 
 /// The origin of the blocks in `input`, null or the filter's input, with the filter's array.
-Origin originOf(vtkDataObject* input, vtkAlgorithm* filter, int component, bool fillGhosts);
+Origin originOf(vtkDataObject* input, vtkAlgorithm* filter, int component, const std::vector<double>& missing,
+                bool fillGhosts);
 
 }  // namespace pv
 

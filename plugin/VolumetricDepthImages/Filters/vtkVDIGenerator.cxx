@@ -1,5 +1,7 @@
 #include "vtkVDIGenerator.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>  // fmt::join
 #include <vtkDataObject.h>
 #include <vtkDataSetAttributes.h>
 #include <vtkFieldData.h>
@@ -364,7 +366,7 @@ void vtkVDIGenerator::AnnounceRange(const char* array, int components, int compo
 }
 
 pv::Origin vtkVDIGenerator::OriginOf(vtkDataObject* input) {
-  pv::Origin origin = pv::originOf(input, this, this->Component, this->FillGhosts);
+  pv::Origin origin = pv::originOf(input, this, this->Component, this->MissingValues, this->FillGhosts);
   origin.choice.nearest = this->Settings[vdi::indexOfSetting("InterpolationType")] ==
                           static_cast<double>(vdi::Interpolation::Nearest);
   return origin;
@@ -384,6 +386,7 @@ void vtkVDIGenerator::ShowBlocks(vtkDataObject* input, const pv::Origin& origin)
         {origin.choice.cells ? 1U : 0U, "SelectInputScalars, of points or of cells"},
         {static_cast<std::uint64_t>(std::int64_t{this->Component}), "Component"},
         {origin.choice.nearest ? 1U : 0U, "InterpolationType"},
+        {std::hash<std::string>()(fmt::format("{}", fmt::join(this->MissingValues, " "))), "MissingValues"},
         {this->FillGhosts ? 1U : 0U, "FillGhosts"},
         {this->PictureOnly ? 1U : 0U, "PictureOnly"},
         {static_cast<std::uint64_t>(this->BlendMode), "BlendMode"}};

@@ -30,7 +30,8 @@ void vtkVDIProperties::PrintSelf(ostream& os, vtkIndent indent) {
     const vdi::Setting& setting = vdi::settingsTable()[i];
     os << indent << setting.property << ": " << this->Settings[i] << "\n";
   }
-  os << indent << "Lights: " << this->Lights.size() << "\n"
+  os << indent << "MissingValues: " << fmt::format("{}", fmt::join(this->MissingValues, " ")) << "\n"
+     << indent << "Lights: " << this->Lights.size() << "\n"
      << indent << "Cropping: " << this->Cropping << "\n"
      << indent << "CroppingBox: " << fmt::format("{}", fmt::join(this->CroppingBox, " ")) << "\n"
      << indent << "ClippingPlanes: " << this->ClippingPlanes.size() << "\n"
@@ -71,6 +72,17 @@ void vtkVDIProperties::AddClippingPlane(double originX, double originY, double o
 void vtkVDIProperties::RemoveAllClippingPlanes() {
   if (this->ClippingPlanes.empty()) return;
   this->ClippingPlanes.clear();
+  this->Modified();
+}
+
+void vtkVDIProperties::AddMissingValue(double value) {
+  this->MissingValues.push_back(value);
+  this->Modified();
+}
+
+void vtkVDIProperties::RemoveAllMissingValues() {
+  if (this->MissingValues.empty()) return;
+  this->MissingValues.clear();
   this->Modified();
 }
 

@@ -51,6 +51,11 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIProperties : public vtkImageAlgorith
 
   /// The component of a multi-component array; -1 (default): the magnitude.
   vtkSetMacro(Component, int);
+  ///@{
+  /// Numbers that stand for missing values (vdi::ComponentArray::missing).
+  void AddMissingValue(double value);
+  void RemoveAllMissingValues();
+  ///@}
   /// The columns and rows of lists in the VDI's picture. 0 0 (default): 1280 x 720.
   vtkSetVector2Macro(Resolution, int);
   ///@{
@@ -148,6 +153,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIProperties : public vtkImageAlgorith
   vtkSmartPointer<vtkPiecewiseFunction> ScalarOpacityFunction;
   double ScalarOpacityUnitDistance = 0.0;
   int Component = -1;
+  std::vector<double> MissingValues;
   int Resolution[2] = {0, 0};
   std::vector<double> Settings;  // [vdi::settingsTable().size()]
   std::vector<std::array<double, 6>> Lights;

@@ -155,6 +155,8 @@ def _load():
     library.vdi_catalyst_set_array_strided.argtypes = [
         handle, text, ctypes.c_int32, ctypes.c_int32, ctypes.c_int32, ctypes.POINTER(ctypes.c_void_p), ctypes.POINTER(_Strides)]
     library.vdi_catalyst_set_array_offset.argtypes = [handle, text, ctypes.c_int32, ctypes.c_double * 3]
+    library.vdi_catalyst_set_array_missing.argtypes = [handle, text, ctypes.c_int32, ctypes.c_int32,
+                                                       ctypes.POINTER(ctypes.c_double)]
     library.vdi_catalyst_set_particles.argtypes = [handle, text, ctypes.POINTER(_Particles)]
     library.vdi_catalyst_wants.argtypes = [handle, ctypes.c_int64, ctypes.c_double]
     library.vdi_catalyst_execute.argtypes = [handle, ctypes.c_int64, ctypes.c_double]
@@ -167,6 +169,22 @@ def _load():
     library.vdi_catalyst_error.argtypes = [handle]
     library.vdi_catalyst_error.restype = text
     return library
+
+
+class _Masked:
+    """A copy of a masked array, in which masked values are NaN. `fill` makes the copy anew, from the values and the mask as
+    they are then."""
+
+    def __init__(self, array):
+        self._array = array
+        kind, size = array.dtype.kind, array.dtype.itemsize
+        narrow = kind in "iub" and size < 4  # floats hold all values of these types
+        self.values = np.empty(array.shape, array.dtype if kind not in "iub" else "float32" if narrow else "float64")
+        self.fill()
+
+    def fill(self):
+        np.copyto(self.values, self._array.data)
+        self.values[np.ma.getmaskarray(self._array)] = np.nan
 
 
 def _as_pairs(array):
@@ -245,6 +263,7 @@ class Catalyst:
         self._library = _load()
         self._blocks = []
         self._kept = {}  # arrays that the engine points to, by association and name
+        self._masked = {}  # those that are copies of masked arrays
         self._shared_error = None  # the last one, which all ranks have raised
         self._is_alone = communicator.Get_size() == 1
         self._run = _Run(self._library, kind, communicator)
@@ -270,12 +289,17 @@ class Catalyst:
         self._check(self._library.vdi_catalyst_set_blocks(self._handle, len(blocks), made))
         self._blocks = blocks
         self._kept = {}
+        self._masked = {}
 
-    def set_array(self, name, arrays, points=False, offset=None):
+    def set_array(self, name, arrays, points=False, offset=None, missing=None):
         """The values of one named array: arrays[i] belongs to block i, and is None if the block lacks it. It is [z][y][x], or
         [z][y][x][component] for vectors, of which a run shows the magnitude unless told otherwise. Complex numbers are vectors
         of two. Values are of cells, or of points, of which a block has one more per axis. On staggered grids the values lie
         `offset` cells (x, y, z; -0.5 to 0.5) beside these.
+
+        Missing values are transparent, and count in no range of colours: NaN, values that equal one of the numbers `missing`,
+        such as a file's fill value, and those that a masked array masks. execute() copies masked arrays each time, integers as
+        floats.
 
         Arrays are kept alive: change them in place between steps, or set others. They are used in place, whatever their
         strides: slices, transposed arrays, one field of several. Raises ValueError, which says what to write, for a shape that
@@ -285,12 +309,19 @@ class Catalyst:
         with self._or_refused():
             key = _faults.name_bytes(name)
             arrays = _faults.one_per_block(name, arrays, len(self._blocks))
+            masked = [_Masked(array) if isinstance(array, np.ma.MaskedArray) else None for array in arrays]
+            arrays = [array if copy is None else copy.values for array, copy in zip(arrays, masked)]
             number, components, pointers, strides = self._given(name, arrays, points)
+            numbers = [] if missing is None else [float(number) for number in np.ravel(missing)]
             offsets = None if offset is None else (ctypes.c_double * 3)(
                 *_faults.triple("the offset of '%s'" % name, offset, float, "(-0.5, 0, 0), in cells"))
         self._check(self._library.vdi_catalyst_set_array_strided(
             self._handle, key, number, association, components, pointers, strides))
         self._kept[association, name] = arrays
+        self._masked[association, name] = [copy for copy in masked if copy is not None]
+        if missing is not None:
+            self._check(self._library.vdi_catalyst_set_array_missing(
+                self._handle, key, association, len(numbers), (ctypes.c_double * max(len(numbers), 1))(*numbers)))
         if offsets is not None:
             self._check(self._library.vdi_catalyst_set_array_offset(self._handle, key, association, offsets))
 
@@ -330,6 +361,7 @@ class Catalyst:
             key = _faults.name_bytes(name)
             made, kept = _particles(positions, weights, lengths, density)
         self._check(self._library.vdi_catalyst_set_particles(self._handle, key, made))
+        self._masked.pop((_CELLS, name), None)
         self._kept[_CELLS, name] = kept  # an array of cells, as far as the engine is concerned
 
     def wants(self, step, time=0.0):
@@ -344,6 +376,9 @@ class Catalyst:
     def execute(self, step, time=0.0):
         """Makes what the scripts or the JSON ask for, from the current values. `step` is the same on all ranks and at least 0,
         with scripts below 2**31, and `time` is finite."""
+        for copies in self._masked.values():
+            for copy in copies:
+                copy.fill()
         with self._or_refused(self._library.vdi_catalyst_execute, -1, 0.0):
             step, time = _faults.whole_number("the step", step, "int(step)"), float(time)
         self._check(self._library.vdi_catalyst_execute(self._handle, step, time))
