@@ -467,3 +467,44 @@ TEST_CASE("wrong arguments are refused with their names") {
       generator.generate(test::oblique(), test::threeHues(1.0), test::smallSettings())->supersegmentCount() >
       0);
 }
+
+TEST_CASE("points in one plane are a sheet one spacing thick, on any axis and in several blocks") {
+  VdiGenerator generator(device(), comm::Communicator::serial());
+  const glm::dvec3 spacing(0.08, 0.1, 0.09);
+  for (int axis = 0; axis < 3; ++axis) {
+    INFO("axis " << axis);
+    glm::ivec3 size(12, 10, 11);
+    size[axis] = 1;
+    const auto valueAt = [axis](glm::ivec3 i) {
+      i[axis] = 0;
+      return 0.5 + 0.5 * std::sin(0.7 * i.x + 0.4 * i.y + 0.9 * i.z);
+    };
+    const auto pictureOf = [&](const glm::ivec3& dims, const glm::dvec3& origin, const glm::ivec3& blocks) {
+      const synthetic::Lattice lattice{dims, origin, spacing, ScalarType::F32, Joint::SharedPoints};
+      std::vector<Block> all;
+      for (const synthetic::Part& part :
+           synthetic::decompose(dims, blocks, synthetic::Layout::OnOneRank, Joint::SharedPoints, 1, 1))
+        all.push_back(synthetic::makeBlock(lattice, part, valueAt));
+      generator.setBlocks(all);
+      GenerateSettings settings = test::smallSettings();
+      settings.samplesPerVoxel = 4.0;
+      const Camera camera =
+          Camera::framing({glm::dvec3(0.0), glm::dvec3(1.0)}, {-0.6, -0.7, -0.9}, {0.0, 1.0, 0.0});
+      CHECK(flatten(*generator.generate(camera, test::threeHues(1.0), settings)).rgba.size() > 0);
+      return *generator.renderVolume(camera, test::threeHues(1.0), settings);
+    };
+    glm::ivec3 thick = size;
+    thick[axis] = 2;
+    glm::dvec3 below(0.0);
+    below[axis] = -0.5 * spacing[axis];
+    const Image expected = pictureOf(thick, below, glm::ivec3(1));
+    CHECK(highestOpacity(expected) > 0.2F);
+    for (const glm::ivec3& blocks : {glm::ivec3(1), glm::ivec3(2)}) {
+      const Image seen = pictureOf(size, glm::dvec3(0.0), blocks);
+      float worst = 0.0F;
+      for (std::size_t i = 0; i < seen.rgba.size(); ++i)
+        worst = std::max(worst, glm::length(seen.rgba[i] - expected.rgba[i]));
+      CHECK(worst < 2.0F / 255.0F);
+    }
+  }
+}

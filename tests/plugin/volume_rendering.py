@@ -23,6 +23,52 @@ for name, (kind, scale, as_cells, parallel_scale) in CASES.items():
     write_png("brain_%s.png" % name, np.hstack([ours, theirs]))
     simple.Delete(view)
 
+# Direction matrices that mirror and permute the axes, one of them to within rounding: ParaView's picture, also shaded, and
+# the picture of the same values in the world's order.
+values = waves((14, 18, 22), (1, 1, 1))
+DIRECTIONS = {"nearly_identity": [[1, 0, 0], [0, 1 - 1e-12, 0], [1e-12, 0, 1]], "mirrored": [[-1, 0, 0], [0, 1, 0], [0, 0, -1]],
+              "permuted": [[0, 0, 1], [1, 0, 0], [0, 1, 0]], "both": [[0, -1, 0], [0, 0, 1], [-1, 0, 0]]}
+for as_cells in (False, True):
+    association = "CELLS" if as_cells else "POINTS"
+    for name, rows in DIRECTIONS.items():
+        image = image_of(values, "waves", (1.0, 1.5, 0.75), (3, -2, 5), as_cells)
+        image.SetExtent(2, image.GetDimensions()[0] + 1, -3, image.GetDimensions()[1] - 4, 5, image.GetDimensions()[2] + 4)
+        image.SetDirectionMatrix(*np.ravel(rows).astype(float))
+        source = producer_of(image)
+        source.UpdatePipeline()
+        center = np.array(image.GetCenter())
+        matrix = np.rint(rows).astype(int)
+        axes, signs = np.abs(matrix).argmax(1), matrix.sum(1)
+        reordered = values.transpose(2, 1, 0).transpose(axes)[tuple(slice(None, None, sign) for sign in signs)]
+        bounds = image.GetBounds()
+        in_order, _ = source_of_values(reordered.transpose(2, 1, 0), "waves", np.array(image.GetSpacing())[axes],
+                                       bounds[::2], as_cells)
+        set_colors("waves", values.min(), values.max(), peak=0.5)
+        view = make_view([200, 160], list(center + [28, 22, 50]), list(center))
+        for shade in (0, 1):
+            ours = picture(vdi_filter(source, view, association, "waves", 2.0, Shade=shade))
+            plain = picture(vdi_filter(in_order, view, association, "waves", 2.0, Shade=shade))
+            check(np.abs(ours.astype(int) - plain).max() <= 1, "%s %s, shade %d: the picture of the values in order"
+                  % (name, association, shade))
+            theirs = paraview_volume(source, view, association, "waves", 2.0, Shade=shade)
+            similar = ssim(ours, theirs)
+            write_png("directions_%s_%s_%d.png" % (name, association, shade), np.hstack([ours, theirs]))
+            check(similar >= (0.95 if shade else 0.98), "%s %s, shade %d: SSIM with ParaView's own %.4f"
+                  % (name, association, shade, similar))
+        simple.Delete(view)
+# One slice of points, and one of cells, is a sheet.
+for as_cells in (False, True):
+    image = image_of(values[:1], "waves", (1.0, 1.5, 0.75), as_cells=False)
+    if as_cells:
+        image = image_of(values[0, :-1, :-1][None], "waves", (1.0, 1.5, 0.75), as_cells=True)
+        image.SetDimensions(values.shape[2], values.shape[1], 1)
+    source = producer_of(image)
+    source.UpdatePipeline()
+    association = "CELLS" if as_cells else "POINTS"
+    view = make_view([120, 100], [28, 32, 40], list(image.GetCenter()))
+    check(picture(vdi_filter(source, view, association, "waves", 0.2)).max() > 100, "one slice of %s" % association)
+    simple.Delete(view)
+
 # Where a surface is a voxel wide, one sample per voxel shows the same as eight, in volume rendering and in VDIs, without
 # wood grain. The functions: opacity that rises from 0 to 0.6 over a voxel of material, and opaque bands 4 % of the range
 # wide.

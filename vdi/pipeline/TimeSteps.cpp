@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <limits>
 #include <type_traits>
 #include <utility>
 
@@ -32,6 +33,32 @@ void requireUsableValues(const comm::Communicator& comm, std::span<const Block> 
                   limitsOf(ScalarType::F32).minimum, limitsOf(ScalarType::F64).minimum));
 }
 
+/// Collective: makes a sheet of values, which has no volume, one spacing thick.
+void thickenSheet(const comm::Communicator& comm, std::span<Block> blocks) {
+  const glm::dvec3 none(std::numeric_limits<double>::infinity());
+  Box bounds{none, -none};
+  glm::dvec3 finest = none;
+  for (const Block& block : blocks) {
+    if (glm::any(glm::greaterThan(block.owned.lo, block.owned.hi))) continue;
+    bounds = {glm::min(bounds.lo, block.owned.lo), glm::max(bounds.hi, block.owned.hi)};
+    finest = glm::min(finest, block.spacing);
+  }
+  std::array<double, 9> least{bounds.lo.x,  bounds.lo.y, bounds.lo.z, -bounds.hi.x, -bounds.hi.y,
+                              -bounds.hi.z, finest.x,    finest.y,    finest.z};
+  comm.allReduceMin(least);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double thickness = -least[axis + 3] - least[axis];
+    constexpr double rounding = 1e-3;  // share of a spacing by which ranks may differ in a sheet's place
+    if (!(thickness >= 0.0 && thickness < rounding * least[axis + 6])) continue;
+    const auto a = static_cast<int>(axis);
+    for (Block& block : blocks) {
+      if (glm::any(glm::greaterThan(block.owned.lo, block.owned.hi))) continue;
+      block.owned.lo[a] = least[axis] - 0.5 * least[axis + 6];
+      block.owned.hi[a] = least[axis] + 0.5 * least[axis + 6];
+    }
+  }
+}
+
 /// Collective: all ranks' probes, by index.
 std::vector<Probe> globalProbes(const comm::Communicator& comm, const Scene& scene,
                                 std::span<const Block> blocks) {
@@ -57,6 +84,7 @@ TimeSteps::Step TimeSteps::send(std::vector<Block> blocks, bool fillGhosts,
   Step step;
   comm_.together([&] { validate(blocks); });
   requireUsableValues(comm_, blocks);
+  thickenSheet(comm_, blocks);
   for (const Block& block : blocks) {
     step.bytes += block.byteCount();
     step.doubles = step.doubles || block.type == ScalarType::F64;

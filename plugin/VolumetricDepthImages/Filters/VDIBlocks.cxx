@@ -12,6 +12,7 @@
 #include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <type_traits>
@@ -111,13 +112,66 @@ void requireLength(vtkDataArray* array, const glm::ivec3& values, const std::str
               block);
 }
 
-/// The lattice of an image's cells.
+/// The lattice of an image, along the image's own axes.
 struct Lattice {
-  glm::dvec3 origin;  // lower corner of the first cell
-  glm::dvec3 spacing;
   glm::ivec3 points;
   glm::ivec3 cells;
 };
+
+/// The image's axes among the world's.
+struct Axes {
+  glm::ivec3 of{0, 1, 2};        // the image's axis along each of the world's
+  glm::bvec3 isReversed{false};  // whether indices fall along that axis of the world
+
+  template <typename T>
+  glm::vec<3, T> permuted(const glm::vec<3, T>& v) const {
+    return {v[of.x], v[of.y], v[of.z]};
+  }
+  /// Per axis of the world, negative along reversed axes.
+  template <typename T>
+  glm::vec<3, T> directed(const glm::vec<3, T>& v) const {
+    return glm::mix(permuted(v), -permuted(v), isReversed);
+  }
+  /// A box of an image of `counts` values, or cells, in indices along the world's axes.
+  vdi::IndexBox placed(const vdi::IndexBox& box, const glm::ivec3& counts) const {
+    const glm::ivec3 size = permuted(counts);
+    const glm::ivec3 lo = permuted(box.lo);
+    const glm::ivec3 hi = permuted(box.hi);
+    return {glm::mix(lo, size - hi, isReversed), glm::mix(hi, size - lo, isReversed)};
+  }
+};
+
+/// The axes of an image whose direction matrix permutes and mirrors them; nullopt if it rotates by other
+/// angles.
+std::optional<Axes> axesOf(vtkImageData* image) {
+  constexpr double rounding = 1e-6;  // as files in single precision have it
+  Axes axes;
+  for (int row = 0; row < 3; ++row) {
+    int along = 0;
+    for (int column = 0; column < 3; ++column) {
+      const double share = image->GetDirectionMatrix()->GetElement(row, column);
+      if (std::abs(share) <= rounding) continue;
+      if (std::abs(std::abs(share) - 1.0) > rounding) return std::nullopt;
+      ++along;
+      axes.of[row] = column;
+      axes.isReversed[row] = share * image->GetSpacing()[column] < 0.0;
+    }
+    if (along != 1) return std::nullopt;
+  }
+  const bool isPermutation = axes.of.x != axes.of.y && axes.of.y != axes.of.z && axes.of.x != axes.of.z;
+  return isPermutation ? std::optional(axes) : std::nullopt;
+}
+
+/// The values by indices along the world's axes.
+void turn(Memory& memory, const Axes& axes, const glm::ivec3& counts) {
+  vdi::ComponentArray& values = memory.values;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int own = axes.of[axis];
+    if (axes.isReversed[axis]) values.first += (counts[own] - 1) * values.strides[own];
+  }
+  values.strides = axes.directed(values.strides);
+  memory.offset = axes.directed(memory.offset);
+}
 
 /// The image's flags; null if there are none. Throws if the image has more points or cells than flags.
 const unsigned char* flagsOf(vtkUnsignedCharArray* ghosts, const glm::ivec3& values,
@@ -196,9 +250,12 @@ Blanking blankingOf(vtkImageData* image, const Lattice& lattice, bool ofCells, c
 void addImage(vtkImageData* image, const ArrayChoice& choice, const std::string& name,
               std::vector<vdi::Block>& blocks) {
   if (image->GetNumberOfPoints() == 0) return;
-  if (!image->GetDirectionMatrix()->IsIdentity()) {
+  const std::optional<Axes> axes = axesOf(image);
+  if (!axes) {
     throw Error(ErrorCode::InvalidArgument,
-                "rotated images (a direction matrix) can't be handled; resample them first", name);
+                "images rotated by other than right angles (a direction matrix) can't be handled; resample "
+                "them first, as by Resample To Image",
+                name);
   }
   auto* attributes =
       choice.cells ? static_cast<vtkDataSetAttributes*>(image->GetCellData()) : image->GetPointData();
@@ -207,25 +264,29 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, const std::string&
   if (array == nullptr) return;  // the block lacks it
   int extent[6];
   image->GetExtent(extent);
-  Lattice lattice;
-  for (int axis = 0; axis < 3; ++axis) {
-    lattice.spacing[axis] = image->GetSpacing()[axis];
-    const std::ptrdiff_t side = std::ptrdiff_t{2} * axis;
-    lattice.origin[axis] = image->GetOrigin()[axis] + extent[side] * lattice.spacing[axis];
-    lattice.points[axis] = extent[side + 1] - extent[side] + 1;
-  }
-  lattice.cells = glm::max(lattice.points - 1, glm::ivec3(1));
-  const auto& [origin, spacing, points, cells] = lattice;
+  const glm::ivec3 low{extent[0], extent[2], extent[4]};
+  const glm::ivec3 high{extent[1], extent[3], extent[5]};
+  const Lattice lattice{high - low + 1, glm::max(high - low, glm::ivec3(1))};
+  const auto& [points, cells] = lattice;
+  const glm::dvec3 spacing = glm::abs(
+      axes->permuted(glm::dvec3(image->GetSpacing()[0], image->GetSpacing()[1], image->GetSpacing()[2])));
+  const glm::dvec3 first(axes->placed({low, high}, glm::ivec3(0)).lo);  // the lowest point, from the origin
+  const glm::dvec3 origin =
+      glm::dvec3(image->GetOrigin()[0], image->GetOrigin()[1], image->GetOrigin()[2]) + first * spacing;
+  // An image that is one point thick has a layer of cells around these points.
+  const glm::dvec3 thin(glm::equal(axes->permuted(points), glm::ivec3(1)));
+  const glm::dvec3 corner = origin - 0.5 * thin * spacing;
   requireLength(array, choice.cells ? cells : points, name);
   requireComponent(array, choice.component);
   const glm::ivec3 counts = choice.cells ? cells : points;
   Memory memory = memoryOf(array, counts);
   memory.values.missing.insert(memory.values.missing.end(), choice.missing.begin(), choice.missing.end());
   Blanking blanking = blankingOf(image, lattice, choice.cells, name);
-  const void* const first = memory.values.first;
-  vdi::Block block = choice.cells
-                         ? vdi::Block::fromCells(counts, origin, spacing, vdi::ScalarType::U8, first)
-                         : vdi::Block::fromPoints(counts, origin, spacing, vdi::ScalarType::U8, first);
+  turn(memory, *axes, counts);
+  const void* const data = memory.values.first;
+  const glm::ivec3 dims = axes->permuted(counts);
+  vdi::Block block = choice.cells ? vdi::Block::fromCells(dims, corner, spacing, vdi::ScalarType::U8, data)
+                                  : vdi::Block::fromPoints(dims, origin, spacing, vdi::ScalarType::U8, data);
   block.moveValues(memory.offset);
   block.nearest = choice.nearest;
   const bool isOne = memory.values.components == 1;
@@ -233,12 +294,14 @@ void addImage(vtkImageData* image, const ArrayChoice& choice, const std::string&
   // The deleter's copy of the smart pointer keeps the array alive.
   block.keepAlive = std::shared_ptr<const void>(
       block.data, [array = memory.owner](const void*) mutable { array = nullptr; });
+  for (vdi::IndexBox& box : blanking.masked) box = axes->placed(box, counts);
   if (!blanking.masked.empty())
     block.masked = std::make_shared<std::vector<vdi::IndexBox>>(std::move(blanking.masked));
-  for (const vdi::IndexBox& box : blanking.own) {
-    // A lattice that is one point thick has no cell along that axis, and so owns nothing there.
+  for (const vdi::IndexBox& drawn : blanking.own) {
+    const vdi::IndexBox box = axes->placed(drawn, cells);
+    // Points in one plane have no cell across it. If all images' do, the library makes a sheet of them.
     for (int axis = 0; axis < 3; ++axis) {
-      if (points[axis] == 1) continue;
+      if (thin[axis] != 0.0) continue;
       block.owned.lo[axis] = origin[axis] + box.lo[axis] * spacing[axis];
       block.owned.hi[axis] = origin[axis] + box.hi[axis] * spacing[axis];
     }

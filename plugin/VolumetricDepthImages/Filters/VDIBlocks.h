@@ -27,7 +27,8 @@ struct ArrayChoice {
 /// memory layout, are copied. A block doesn't own cells that vtkGhostType marks as duplicate, refined or
 /// hidden, nor cells with a hidden point. It masks the values of refined and hidden cells and of hidden
 /// points. Levels of AMR data stay unchanged: once the blocks of all ranks meet, the finest level owns the
-/// overlap. Throws vdi::Error{InvalidArgument} for a data set other than vtkImageData, a rotated image, a
+/// overlap. Direction matrices may permute and mirror the axes: values are read in the world's order. Throws
+/// vdi::Error{InvalidArgument} for a data set other than vtkImageData, an image rotated otherwise, a
 /// component that the array lacks, and an array or a vtkGhostType that is shorter than the image.
 std::vector<vdi::Block> blocksOf(vtkDataObject* data, const ArrayChoice& choice);
 

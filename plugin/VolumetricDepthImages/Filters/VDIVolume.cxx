@@ -53,7 +53,7 @@ void requireVolume(const vdi::VdiGenerator& generator, const Load& load) {
   if (!generator.scene().bounds.empty()) return;
   if (!generator.communicator().anyTogether([&] { return !load.blocks.empty(); })) return;
   throw vdi::Error(vdi::ErrorCode::InvalidArgument,
-                   "the input has no volume: it needs at least two points along each axis");
+                   "the input shows nothing: vtkGhostType hides all of its cells");
 }
 
 }  // namespace
