@@ -61,6 +61,18 @@ export function rangeText(low, high) {
   return from === to ? `${low} to ${high}` : `${from} to ${to}`;
 }
 
+/**
+ * A colour map as a CSS gradient.
+ * @param {Coloring["transferFunction"]["colors"]} colors of at least two values
+ * @param {string} towards the side of the greatest value
+ */
+export function gradientOf(colors, towards) {
+  const low = colors[0][0], high = colors[colors.length - 1][0];
+  const stops = colors.map(([scalar, ...rgb]) =>
+    `rgb(${rgb.map((share) => Math.round(255 * share)).join(" ")}) ${(100 * shareOf(scalar, low, high)).toFixed(3)}%`);
+  return `linear-gradient(to ${towards}, ${stops.join(", ")})`;
+}
+
 /** @param {Coloring} coloring */
 function titleOf(coloring) {
   const {name, components, component} = coloring.array;
@@ -93,12 +105,10 @@ export function showLegend(figure, coloring) {
   if (!coloring || !(high > low)) return;
   const span = Math.min(high - low, Number.MAX_VALUE);
   const percent = (/** @type {number} */ value) => 100 * shareOf(value, low, high);
-  const stops = colors.map(([scalar, ...rgb]) =>
-    `rgb(${rgb.map((share) => Math.round(255 * share)).join(" ")}) ${percent(scalar).toFixed(3)}%`);
   const caption = document.createElement("figcaption");
   caption.textContent = titleOf(coloring);
   const bar = part("bar");
-  bar.style.background = `linear-gradient(to top, ${stops.join(", ")})`;
+  bar.style.background = gradientOf(colors, "top");
   const ticks = ticksOf(low, high).map((value) => {
     const tick = part("tick", numberText(value, span));
     tick.style.bottom = `${percent(value)}%`;

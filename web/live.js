@@ -2,8 +2,10 @@
 // and reconnects after a failure. docs/live.md has the protocol.
 
 import {LevelAssembler, STREAM_VERSION, StreamError, extendedSeries, serverMessageOf} from "./messages.js";
+import {PendingRequests} from "./pending.js";
 
 /** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
+/** @typedef {import("./format.js").Camera} Camera */
 /** @typedef {import("./messages.js").Level} Level */
 /** @typedef {import("./messages.js").Series} Series */
 /** @typedef {import("./messages.js").Steering} Steering */
@@ -91,10 +93,14 @@ export class Live {
     this.viewers = 0;
     /** @type {Steering | null} null: the server has sent none */
     this.steering = null;
+    /** This viewer's requests that the simulation hasn't taken yet. */
+    this.pending = new PendingRequests();
     /** The reason why the server rejected this viewer's last wish; empty if it didn't. */
     this.denied = "";
     /** @type {Arrived | undefined} the level on show; during a pause it may be a former session's */
     this.shown = undefined;
+    /** @type {Camera | undefined} of the VDI on show */
+    this.camera = undefined;
     this.session = "";
     /** @type {Socket | undefined} */
     this.socket = undefined;
@@ -148,6 +154,7 @@ export class Live {
     this.trouble = "";
     this.steering = null;
     this.denied = "";
+    this.pending.clear();
     socket?.close();
   }
 
@@ -274,9 +281,11 @@ export class Live {
       this.change(message.state, "");
     } else if (message.type === "steering") {
       this.steering = message;
+      this.settle();
       this.change(this.state, this.cause);
     } else if (message.type === "denied") {
       this.denied = message.cause;
+      this.pending.refuse();
       this.change(this.state, this.cause);
     } else if (message.type === "missing") {
       if (message.frame === this.wanted) this.miss(message.frame, `frame ${message.frame + 1}: ${message.cause}`);
@@ -401,6 +410,8 @@ export class Live {
           continue;
         }
         this.shown = level;
+        this.camera = vdi.camera;
+        this.settle();
         if (socket !== this.socket) {  // the cause of the loss stays
           this.options.onChange();
           continue;
@@ -504,7 +515,17 @@ export class Live {
   /** @param {Wish} wish */
   steer(wish) {
     this.denied = "";
+    this.pending.add(wish, performance.now());
+    this.settle();
     this.send({type: "steer", ...wish});
+    this.options.onChange();
+  }
+
+  /** Forgets the requests that have been met. */
+  settle() {
+    const {steering, pending} = this;
+    if (steering === null || steering.driver !== steering.you) pending.clear();
+    else pending.settle(steering, this.camera);
   }
 
   /** @returns {number} bytes per second over the last few seconds */

@@ -83,6 +83,8 @@ export function liveText(live, now) {
   if (state === "lost" && !isOver) parts.push(live.cause, `next attempt in ${Math.max(Math.ceil((live.retryAt - now) / 1000), 0)} s`);
   else if (live.cause && !isOver) parts.push(live.cause);
   if (live.trouble) parts.push(live.trouble);
+  const pending = live.pending.text(now);
+  if (pending) parts.push(pending);
   if (live.steering?.paused) parts.push("the simulation is paused");
   if (shown) {
     if (live.series && live.wanted !== null) parts.push(`frame ${shown.frame + 1} of ${live.series.steps.length}`);

@@ -51,6 +51,7 @@ function refuse(what, cause) {
  * @property {number} supersegments
  * @property {[number, number] | null} range of the colour map; null without one
  * @property {string[]} presets
+ * @property {string} [preset] the colour map in force, "" if it has no name; older servers don't say
  * @property {number} [sampling_rate] samples per voxel, 0: automatic; older servers don't say
  * @typedef {{type: "steering", you: number, driver: number | null, period: number, paused: boolean,
  *            parameters: Parameter[], generator: Generator | null}} Steering what a driver may change,
@@ -170,13 +171,14 @@ function samplingRateOf(rate) {
 }
 
 /** @param {any} json @returns {Generator} */
-function generatorOf({resolution, supersegments, range, presets, sampling_rate}) {
+function generatorOf({resolution, supersegments, range, presets, preset, sampling_rate}) {
   const isSize = Array.isArray(resolution) && resolution.length === 2 && resolution.every((side) => isWhole(side, 0, MOST_LISTS));
   if (!isSize || !isWhole(supersegments, 0, MOST_SUPERSEGMENTS)) refuse("a wrong resolution");
   const rises = Array.isArray(range) && range.length === 2 && range.every(Number.isFinite) && range[0] < range[1];
   if (!rises && range !== null) refuse("a range whose ends don't ascend");
   return {resolution: [resolution[0], resolution[1]], supersegments, range: rises ? [range[0], range[1]] : null,
-          presets: fewOf(presets, "presets").map((name) => textOf(name, MOST_ENTRIES)), ...samplingRateOf(sampling_rate)};
+          presets: fewOf(presets, "presets").map((name) => textOf(name, MOST_ENTRIES)),
+          ...typeof preset === "string" ? {preset: textOf(preset, MOST_ENTRIES)} : {}, ...samplingRateOf(sampling_rate)};
 }
 
 /** @param {any} json @returns {Steering} */

@@ -7,6 +7,7 @@ import {Decoder, serveDecoding} from "./decoder.js";
 import {mostElements} from "./gl.js";
 import {rangeText, showLegend} from "./legend.js";
 import {LivePanel, takeToken} from "./livepanel.js";
+import {addPanels} from "./panels.js";
 import {SteerPanel} from "./steerpanel.js";
 import {embeddedSource, filesSource} from "./sources.js";
 import {length, minus} from "./vector.js";
@@ -149,15 +150,8 @@ export class Page {
     });
     element("view").addEventListener("keydown", (event) => this.onKey(event));
     element("view").addEventListener("pointerdown", () => element("look").removeAttribute("open"));
-    // One panel above the bar is open at a time. The steering panel stays open while the user drags
-    // the picture.
-    const panels = [element("look"), element("steer")];
-    for (const panel of panels) {
-      panel.addEventListener("toggle", () => {
-        if (panel.hasAttribute("open")) for (const other of panels) if (other !== panel) other.removeAttribute("open");
-      });
-    }
-    window.addEventListener("resize", () => viewer.redraw());
+    // The steering panel stays open while the user drags the picture.
+    addPanels([...document.querySelectorAll("details")], () => viewer.redraw());
     const panelSizes = new ResizeObserver(() => viewer.schedule());
     for (const panel of PANELS) panelSizes.observe(element(panel));
     for (const name of ["focus", "pointerdown", "keydown"]) window.addEventListener(name, () => viewer.takeContext(), true);
@@ -297,7 +291,8 @@ export class Page {
       onSeries: (index) => this.showSeries(index),
       onChange: () => this.steer?.refresh(),
     });
-    this.steer = new SteerPanel(this.live.live, {camera: () => this.viewer.camera, angle: () => this.degrees()});
+    this.steer = new SteerPanel(this.live.live, {camera: () => this.viewer.camera, angle: () => this.degrees(),
+                                                  colors: () => this.vdi?.coloring?.transferFunction.colors ?? []});
     const wanted = fragment().get("frame") ?? "";
     this.live.start(/^\d{1,7}$/.test(wanted) ? Number(wanted) : undefined);
   }

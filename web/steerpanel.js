@@ -3,8 +3,10 @@
 // steering.
 
 import {cameraText} from "./camera.js";
+import {gradientOf} from "./legend.js";
 
 /** @typedef {import("./format.js").Camera} Camera */
+/** @typedef {import("./format.js").Coloring} Coloring */
 /** @typedef {import("./live.js").Live} Live */
 /** @typedef {import("./messages.js").Parameter} Parameter */
 /** @typedef {import("./messages.js").Wish} Wish */
@@ -13,6 +15,7 @@ import {cameraText} from "./camera.js";
  * @typedef {object} SteeredView the view that the user moves
  * @property {() => Camera | undefined} camera the user's
  * @property {() => number} angle between that camera and the VDI's, in degrees
+ * @property {() => Coloring["transferFunction"]["colors"]} colors of the VDI on show; may be empty
  */
 
 const ENDS = ["low", "high"];  // fields of the colours' range
@@ -34,6 +37,7 @@ export function wishedCamera({position, focalPoint, viewUp, parallel, parallelSc
 }
 
 const SLIDER_STEPS = 500;
+const COUNT_MS = 1000;  // interval between updates of the age of requests
 
 /**
  * A slider's value, without the digits that its steps don't resolve.
@@ -120,6 +124,9 @@ export class SteerPanel {
       fieldOf(id).addEventListener("change", () => this.askForRange());
     }
     fieldOf("auto").addEventListener("change", () => this.onRest());
+    setInterval(() => {
+      if (this.live.pending.requests.size > 0) this.refresh();  // counts the seconds
+    }, COUNT_MS);
   }
 
   /** @param {string} id @param {(value: number) => Wish} wishOf */
@@ -195,7 +202,11 @@ export class SteerPanel {
     /** @type {HTMLButtonElement} */ (partOf("drive")).disabled = driver !== null && !isMine;
     for (const id of ["halt", "auto", "resolution", "supersegments", "rate", "preset", "low", "high", "period"])
       fieldOf(id).disabled = !isMine;
-    partOf("halt").textContent = paused ? "Resume simulation" : "Pause simulation";
+    const {pending} = this.live;
+    partOf("halt").textContent = pending.has("paused") ? (paused ? "Resuming…" : "Pausing…")
+      : paused ? "Resume simulation" : "Pause simulation";
+    partOf("newview").textContent = pending.has("camera") ? "View requested…" : "New view from here";
+    partOf("requested").textContent = pending.text(performance.now());
     this.put("period", String(period));
     for (const one of document.querySelectorAll(".generator")) /** @type {HTMLElement} */ (one).hidden = generator === null;
     for (const one of document.querySelectorAll(".colours"))
@@ -207,7 +218,10 @@ export class SteerPanel {
       this.put("supersegments", String(generator.supersegments));
       this.choose("resolution", RESOLUTIONS, width > 0 ? `${width} × ${height}` : "");
       this.choose("rate", RATES, generator.sampling_rate ? String(generator.sampling_rate) : RATES[0]);
-      this.choose("preset", generator.presets, "");
+      const colors = this.view.colors();
+      partOf("inforce").hidden = colors.length < 2;
+      if (colors.length > 1) partOf("inforce").style.background = gradientOf(colors, "right");
+      this.choose("preset", generator.presets, generator.preset ?? "");
       this.showRange(generator.range ?? [0, 1]);
     }
     this.showParameters(parameters, isMine);

@@ -40,6 +40,8 @@ stream::Controls RunSteering::controlsOf(const Steered& steered) const {
   if (range) {
     generator.range = {range->min, range->max};
     generator.presets = config::presetNames();
+    const bool isDefault = run.colors.file.empty() && run.colors.preset.empty();
+    generator.preset = isDefault ? generator.presets.front() : run.colors.preset;
   }
   stream::Controls controls;
   controls.generator = std::move(generator);

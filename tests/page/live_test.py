@@ -9,7 +9,7 @@ import subprocess
 import sys
 import urllib.request
 
-from pagetest import HEIGHT, VDI, WIDTH, azimuth, bare, camera_of, check, compare, message_of, rendered, run, shown, vdi, whole
+from pagetest import HEIGHT, PICTURES, VDI, WIDTH, azimuth, bare, camera_of, check, compare, message_of, rendered, run, shown, vdi, whole
 
 sys.path.append(str(pathlib.Path(__file__).parents[1] / "stream"))
 from proxy import BARE, NGINX, USUAL, Nginx, example  # noqa: E402
@@ -316,6 +316,19 @@ window.WebSocket = Steered;
 """
 
 
+def check_phone(browser):
+    """With the panel open on a phone, the picture is above it."""
+    browser.size(360, 640)
+    whole(browser)
+    browser.screenshot(os.path.join(PICTURES, "steer_phone.png"))
+    places = browser.value("""['#view', '#steer > div', '#bar'].map((name) => document.querySelector(name).getBoundingClientRect())
+      .map(({top, bottom}) => [top, bottom])""")
+    check(places[0][1] <= places[1][0] + 1 and places[0][1] > 250 and places[1][1] <= places[2][0],
+          f"picture, panel and bar don't overlap: {places}")
+    browser.size(WIDTH, HEIGHT)
+    whole(browser)
+
+
 def test_steering(browser):
     os.mkdir("steered")
     make("steered/step_0.vdi", 12, large=False)
@@ -356,6 +369,22 @@ def test_steering(browser):
         check([{key: wish[key] for key in wish if key != "type"} for wish in wishes] == [
             {"parameters": {"feed": 0.05}}, {"parameters": {"feed": 0.1}}, {"period": 3}, {"supersegments": 1024},
             {"resolution": [960, 540]}, {"preset": "X Ray"}, {"range": [0, 0.25]}, {"paused": True}], f"wishes: {wishes}")
+        # What the simulation hasn't taken yet is shown, until it is in force or refused.
+        requested = "document.getElementById('requested').textContent"
+        words = browser.value(requested)
+        check(all(word in words for word in ("feed", "period", "resolution", "pause", "requested")), f"pending: {words}")
+        check(words in line(browser), f"the line has what is pending: {line(browser)}")
+        check(browser.value("document.getElementById('halt').textContent") == "Pausing…", "a pause is pending")
+        browser.wait(f"{requested}.includes('s ago')", SECONDS)
+        browser.value("""wire.say({driver: 2, paused: true, period: 3, parameters: [{name: "feed", whole: false, value: 0.1, low: 0,
+          high: 0.1}], generator: {resolution: [960, 540], supersegments: 1024, range: [0, 0.2500000001], presets: ["X Ray"],
+          preset: "X Ray"}})""")
+        check(browser.value(requested) == "", f"all is in force: {browser.value(requested)}")
+        check(browser.value("document.getElementById('preset').value") == "X Ray", "the colour map in force")
+        browser.value("document.getElementById('halt').click()")
+        check("go on requested" in browser.value(requested), f"pending: {browser.value(requested)}")
+        browser.value("wire.onmessage({data: JSON.stringify({type: 'denied', cause: 'no'})}); wire.say({driver: 2, paused: true})")
+        check(browser.value(requested) == "" and asked() == [{"type": "steer", "paused": False}], "a refused request isn't pending")
         near, far = azimuth(camera_of(browser), 10), azimuth(camera_of(browser), 40)
 
         def rest_at(camera):
@@ -366,6 +395,8 @@ def test_steering(browser):
 
         check(rest_at(near) == [], "nothing is requested unless Auto is on")
         browser.value("document.getElementById('newview').click()")
+        check("new view requested" in browser.value(requested), f"pending: {browser.value(requested)}")
+        check_phone(browser)
         wish = asked()[0]
         check(wish["camera"]["position"] == near["position"] and wish["camera"]["viewAngle"] == near["viewAngle"], f"{wish}")
         browser.value("document.getElementById('auto').click()")

@@ -55,6 +55,8 @@ function testTexts() {
   check(many.type === "steering" && many.generator?.supersegments === 1024, "as many supersegments as a run may have");
   const sampled = {...steering, generator: {...steering.generator, sampling_rate: 0.5}};
   check(JSON.stringify(serverMessageOf(JSON.stringify(sampled))) === JSON.stringify(sampled), "a sampling rate");
+  const named = {...steering, generator: {...steering.generator, preset: "X Ray"}};
+  check(JSON.stringify(serverMessageOf(JSON.stringify(named))) === JSON.stringify(named), "the colour map in force");
   check(serverMessageOf('{"type":"denied","cause":"viewer 2\\ndrives"}').cause === "viewer 2 drives", "a denial of one line");
   const missing = serverMessageOf('{"type":"missing","frame":3,"cause":"damaged\\nor gone"}');
   check(JSON.stringify(missing) === '{"type":"missing","frame":3,"cause":"damaged or gone"}', "a frame that is missing");

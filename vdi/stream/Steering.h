@@ -42,6 +42,7 @@ struct GeneratorControls {
   std::optional<std::array<double, 2>> range;  // of the colour map, if there is one
   std::vector<std::string> presets;            // names of colour maps to choose from
   std::optional<double> samplingRate;          // samples per voxel, 0: automatic; older servers don't say
+  std::optional<std::string> preset;           // in force, "" if it has no name; older servers don't say
   bool operator==(const GeneratorControls&) const = default;
 };
 

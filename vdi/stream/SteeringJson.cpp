@@ -130,6 +130,7 @@ GeneratorControls generatorIn(const JsonValue& value) {
   if (const auto range = value.findUnlessNull("range")) controls.range = rangeIn(*range);
   for (const JsonValue& preset : itemsIn(value.at("presets"), maxPresets))
     controls.presets.push_back(textIn(preset));
+  if (const auto preset = value.findUnlessNull("preset")) controls.preset = textIn(*preset);
   if (const auto rate = value.findUnlessNull("sampling_rate")) controls.samplingRate = samplingRateIn(*rate);
   return controls;
 }
@@ -151,6 +152,7 @@ std::string jsonOf(const GeneratorControls& controls) {
   object.add("supersegments", jsonOf(controls.supersegments));
   object.add("range", controls.range ? pairOf(*controls.range) : "null");
   object.add("presets", jsonListOf(presets));
+  if (controls.preset) object.add("preset", jsonOf(*controls.preset));
   if (controls.samplingRate) object.add("sampling_rate", jsonOf(*controls.samplingRate));
   return object.text();
 }

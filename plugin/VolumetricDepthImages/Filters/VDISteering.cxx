@@ -206,6 +206,7 @@ void Steering::apply(const Wish& wish, vtkSMProxy* generator) {
     if (wish.supersegments) vtkSMPropertyHelper(generator, "Supersegments").Set(*wish.supersegments);
     if (wish.samplingRate) vtkSMPropertyHelper(generator, "SamplingRate").Set(*wish.samplingRate);
     setColours(generator, wish);
+    if (wish.preset) preset_ = *wish.preset;
     generator->UpdateVTKObjects();
   }
   if (!wish.parameters.empty()) (void)exchangeParameters(wish.parameters);
@@ -216,6 +217,7 @@ void Steering::apply(const Wish& wish, vtkSMProxy* generator) {
 void Steering::tell(vtkVDIStreamWriter* server, vtkSMProxy* generator) const {
   Controls controls;
   if (generator != nullptr) controls.generator = controlsOf(generator);
+  if (controls.generator && controls.generator->range) controls.generator->preset = preset_;
   controls.period = period_;
   controls.paused = isPaused_;
   for (const ParameterExchange::Parameter& one : exchangeParameters({}).parameters)

@@ -34,6 +34,7 @@ class Steering {
   int period_ = 1;
   int sinceLast_ = 0;  // number of steps since the last VDI
   bool isPaused_ = false;
+  std::string preset_;  // the viewers' last colour map; empty: none so far
 };
 
 }  // namespace pv
