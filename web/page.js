@@ -11,6 +11,7 @@ import {addPanels} from "./panels.js";
 import {SteerPanel} from "./steerpanel.js";
 import {embeddedSource, filesSource} from "./sources.js";
 import {length, minus} from "./vector.js";
+import {addTools} from "./tools.js";
 import {Viewer} from "./viewer.js";
 
 /** @typedef {import("./format.js").Camera} Camera */
@@ -48,7 +49,6 @@ function colorOf(hex) {
 
 const MOTION_MS = 350;
 const NOTICE_MS = 5000;   // time for which the message that a file can't be opened covers a server's frames
-const FRAMES_PER_SECOND = 10;
 
 /** The settings in the URL's fragment. */
 function fragment() {
@@ -102,6 +102,8 @@ export class Page {
     /** Counts requests for frames. A late answer to an older request is dropped. */
     this.request = 0;
     this.ownBackground = false;
+    /** @type {Vec3 | undefined} the point that the user wants to orbit */
+    this.pivot = undefined;
     /** @type {Promise<void> | undefined} of files that are being opened */
     this.opening = undefined;
     /** The failure to open a file, shown while a server's frames continue. */
@@ -141,7 +143,16 @@ export class Page {
       this.ownBackground = true;
       this.takeTheme();
     });
-    element("screenshot").addEventListener("click", () => this.saveScreenshot());
+    addTools({
+      viewer,
+      tell,
+      center: () => this.orbitCenter(),
+      bounds: () => this.vdi?.bounds,
+      move: (camera) => this.setCamera(camera),
+      orbit: (point) => this.pivot = point,
+      token: () => this.live && !this.source ? this.live.live.options.token : "",
+      viewText: () => this.viewText(true),
+    });
     element("open").addEventListener("click", () => input("files").click());
     input("files").addEventListener("change", () => {
       const files = [...(input("files").files ?? [])];
@@ -208,12 +219,13 @@ export class Page {
   }
 
   /**
-   * The focal point if it lies in the scene, otherwise the scene's middle.
+   * The point that the user has chosen. Otherwise the focal point if it lies in the scene, otherwise the scene's middle.
    * @returns {Vec3}
    */
   orbitCenter() {
     const {vdi, viewer} = this;
     if (!vdi || !viewer.camera) return [0, 0, 0];
+    if (this.pivot) return this.pivot;
     const focal = viewer.camera.focalPoint;
     const inside = focal.every((f, axis) => f >= vdi.bounds[0][axis] && f <= vdi.bounds[1][axis]);
     const middle = centerOf(vdi.bounds);
@@ -384,7 +396,7 @@ export class Page {
     let missed = 0;  // consecutive frames after the one on show
     while (plays === this.plays && this.count() > 0) {
       const next = (this.frame + 1 + missed) % this.count();
-      const pause = new Promise((resolve) => setTimeout(resolve, 1000 / FRAMES_PER_SECOND));
+      const pause = new Promise((resolve) => setTimeout(resolve, 1000 / Number(input("speed").value)));
       const outcome = await this.show(next);
       if (plays !== this.plays) return;
       missed = outcome === "missed" ? missed + 1 : 0;
@@ -403,9 +415,11 @@ export class Page {
     if (!vdi) return;
     const [width, height] = [vdi.width - 2 * vdi.margin[0], vdi.height - 2 * vdi.margin[1]];
     const range = vdi.coloring?.range;
-    const parts = [...facts, `${width} × ${height}`, `${vdi.supersegmentCount.toLocaleString("en")} supersegments`,
+    const parts = [...facts, `3-D picture of ${width} × ${height} pixels`,
                    range ? `values from ${rangeText(...range)}` : ""];
     element("facts").textContent = parts.filter(Boolean).join(" · ");
+    element("facts").title = `A Volumetric Depth Image with ${vdi.supersegmentCount.toLocaleString("en")} supersegments: ` +
+      "pieces of the lines of sight, with one colour each";
   }
 
   /** @param {Camera} camera @param {boolean} [moving] whether further cameras will follow */
@@ -433,6 +447,7 @@ export class Page {
   goHome() {
     const {vdi, viewer} = this;
     if (!vdi || !viewer.camera) return;
+    this.pivot = undefined;
     const from = viewer.camera;
     const start = performance.now();
     let last = from;
@@ -459,15 +474,25 @@ export class Page {
     viewer.refresh();
   }
 
-  keepInUrl() {
+  /**
+   * The view in words of a fragment.
+   * @param {boolean} [isWhole] whether to name the camera even if it is the VDI's own
+   */
+  viewText(isWhole = false) {
     const {vdi, viewer} = this;
-    if (!vdi || !viewer.camera || this.isPlaying) return;
+    if (!vdi || !viewer.camera) return "";
     const parts = [];
     const camera = cameraText(viewer.camera);
-    if (camera !== cameraText(vdi.camera)) parts.push(`camera=${camera}`);
+    if (isWhole || camera !== cameraText(vdi.camera)) parts.push(`camera=${camera}`);
     const isChosen = this.source ? this.frame > 0 : this.live?.isChosen();
     if (isChosen) parts.push(`frame=${this.frame}`);
-    const hash = parts.length > 0 ? `#${parts.join("&")}` : "";
+    return parts.join("&");
+  }
+
+  keepInUrl() {
+    if (!this.vdi || !this.viewer.camera || this.isPlaying) return;
+    const text = this.viewText();
+    const hash = text ? `#${text}` : "";
     if (hash === location.hash) return;
     try {
       history.replaceState(history.state, "", hash || location.pathname + location.search);
@@ -489,19 +514,6 @@ export class Page {
     const text = fragment().get("camera");
     const camera = vdi && text ? cameraOfText(text, vdi.camera) : vdi?.camera;
     if (camera) this.setCamera(camera, false);
-  }
-
-  async saveScreenshot() {
-    try {
-      const url = URL.createObjectURL(await this.viewer.screenshot());
-      const link = document.createElement("a");
-      link.href = url;
-      link.download = `${(document.title || "vdi").replace(/[^\w.-]+/g, "_")}.png`;
-      link.click();
-      setTimeout(() => URL.revokeObjectURL(url), 1000);
-    } catch (error) {
-      tell(messageOf(error));
-    }
   }
 }
 

@@ -1,15 +1,17 @@
 // Shows a VDI in a canvas, in two steps. `drawPicture` renders the VDI to a picture of its own, in
 // strips and at any resolution. `present` puts background, outline and that picture on the canvas.
 
-import {basisOf, clipMatrix, pixelSizeOf, raysOf} from "./camera.js";
+import {basisOf, clipMatrix, pixelSizeOf, raysOf, toView} from "./camera.js";
 import {REGION, cullShader} from "./cull.js";
 import {largestPicture, makeArrayTexture, makeProgram, tilingOf} from "./gl.js";
-import {WHOLE_PICTURE, traverseShader} from "./traverse.js";
+import {MOST_CLIP_PLANES, WHOLE_PICTURE, traverseShader} from "./traverse.js";
+import {dot, normalize} from "./vector.js";
 
 /** @typedef {import("./format.js").Camera} Camera */
 /** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
 /** @typedef {import("./format.js").Vec3} Vec3 */
 /** @typedef {[number, number, number]} Color shares of red, green and blue */
+/** @typedef {{origin: Vec3, normal: Vec3}} ClipPlane hides the side away from which its normal points; world */
 
 const COPY = `#version 300 es
 precision highp float;
@@ -160,6 +162,8 @@ export class Renderer {
     /** @type {Loaded | undefined} */
     this.loaded = undefined;
     this.smooth = true;
+    /** @type {ClipPlane[]} fewer than MOST_CLIP_PLANES */
+    this.clipPlanes = [];
     /** Counts contexts. Objects of former contexts are gone. */
     this.age = 0;
     /** The largest width and height of the canvas. @type {[number, number]} */
@@ -293,6 +297,7 @@ export class Renderer {
     gl.scissor(0, firstRow, width, endRow - firstRow);
     const program = this.programOf(loaded.vdi, sheared);
     this.setRays(program, camera, scale);
+    this.setClipPlanes(program, loaded.vdi.camera);
     gl.activeTexture(gl.TEXTURE4);
     gl.bindTexture(gl.TEXTURE_2D, this.regions?.texture ?? null);
     gl.uniform1i(program.uniform("regions"), 4);
@@ -387,6 +392,41 @@ export class Renderer {
     gl.uniform1f(uniform("pixelScale"), scale);
   }
 
+  /**
+   * @param {ReturnType<typeof makeProgram>} program
+   * @param {Camera} original V_O
+   */
+  setClipPlanes({uniform}, original) {
+    const {gl} = this;
+    const basis = basisOf(original);
+    const planes = this.clipPlanes.slice(0, MOST_CLIP_PLANES).map(({origin, normal}) => {
+      const unit = normalize(normal);
+      /** @type {Vec3} */
+      const turned = [dot(unit, basis.right), dot(unit, basis.up), dot(unit, basis.forward)];
+      return [...turned, dot(turned, toView(origin, original, basis))];
+    });
+    gl.uniform1i(uniform("clipPlaneCount"), planes.length);
+    if (planes.length > 0) gl.uniform4fv(uniform("clipPlanes"), planes.flat());
+  }
+
+  /**
+   * The opacity of a pixel of the canvas before another clipping plane, from 0 to 255. Spoils the
+   * picture that is being drawn.
+   * @param {Camera} camera
+   * @param {number} column
+   * @param {number} row
+   * @param {ClipPlane} plane
+   */
+  alphaAt(camera, column, row, plane) {
+    const {gl, clipPlanes} = this;
+    const pixel = new Uint8Array(4);
+    this.clipPlanes = [...clipPlanes, plane];
+    this.drawPicture(camera, 1, row, row + 1, this.canShear());
+    this.clipPlanes = clipPlanes;
+    gl.readPixels(column, row, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+    return pixel[3];
+  }
+
   /** Makes the drawn picture the one that `present` shows. */
   finishPicture() {
     [this.shown, this.next] = [this.next, this.shown];
@@ -394,19 +434,44 @@ export class Renderer {
 
   /**
    * @param {Camera} camera
-   * @param {Color} background
+   * @param {Color | undefined} background undefined: none
    * @param {Color | undefined} outline its colour; undefined for none
+   * @param {WebGLFramebuffer | null} [target] has the canvas' size; the canvas by default
    */
-  present(camera, background, outline) {
+  present(camera, background, outline, target = null) {
     const {gl, canvas} = this;
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target);
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.disable(gl.BLEND);
-    gl.clearColor(...background, 1);
+    gl.clearColor(...background ?? [0, 0, 0], background ? 1 : 0);
     gl.clear(gl.COLOR_BUFFER_BIT);
     if (outline) this.drawOutline(camera, outline, false);
     this.putPicture();
     if (outline) this.drawOutline(camera, outline, true);
+  }
+
+  /**
+   * The picture that `present` would show, without a background: rows from the top, colours not
+   * premultiplied. Spoils the picture that is being drawn.
+   * @param {Camera} camera
+   * @param {Color | undefined} outline
+   */
+  transparentPixels(camera, outline) {
+    const {gl, canvas, next} = this;
+    const {width, height} = canvas;
+    const pixels = new Uint8ClampedArray(4 * width * height);
+    if (!next) return pixels;
+    next.resize(width, height);
+    this.present(camera, undefined, outline, next.framebuffer);
+    const upward = new Uint8Array(pixels.length);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, upward);
+    for (let row = 0; row < height; ++row)
+      pixels.set(upward.subarray(4 * width * (height - 1 - row), 4 * width * (height - row)), 4 * width * row);
+    for (let i = 0; i < pixels.length; i += 4) {
+      const scale = pixels[i + 3] > 0 ? 255 / pixels[i + 3] : 0;
+      for (let c = i; c < i + 3; ++c) pixels[c] *= scale;
+    }
+    return pixels;
   }
 
   putPicture() {
@@ -442,7 +507,7 @@ export class Renderer {
                             [2 * right / canvas.width, 2 * up / canvas.height]);
     gl.uniformMatrix4fv(lines.uniform("clip"), false, clip);
     gl.enable(gl.BLEND);
-    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     gl.uniform4f(lines.uniform("plain"), ...color, inFront ? 0.7 : 0.4);
     gl.drawArrays(gl.LINES, 0, points.length / 3);
     gl.disableVertexAttribArray(attribute);

@@ -17,6 +17,9 @@ import {ON_FACE} from "./slopes.js";
  * @property {number} layerShift row r lies at y = r mod 2^layerShift in layer r >> layerShift
  */
 
+/** One more than a user sets. */
+export const MOST_CLIP_PLANES = 7;
+
 /** Regions of a picture have 2^REGION_SHIFT pixels a side. */
 export const REGION_SHIFT = 4;
 
@@ -441,6 +444,9 @@ void main() {
     clip(stretch, dot(boxFaces[i].xyz, ray.origin) - boxFaces[i].w, dot(boxFaces[i].xyz, ray.direction));
   }
 #endif
+  for (int i = 0; i < clipPlaneCount; ++i) {
+    clip(stretch, dot(clipPlanes[i].xyz, ray.origin) - clipPlanes[i].w, dot(clipPlanes[i].xyz, ray.direction));
+  }
   if (!(stretch.x < stretch.y)) return;
   Line line = lineOf(ray, stretch);
   ascends = line.bins.y >= 0.0;
@@ -490,6 +496,8 @@ ivec3 placeOf(int i) {
 export function traverseShader(variant) {
   return `${uniformsOf(variant)}#define SMOOTH ${variant.smooth ? 1 : 0}
 #define SHEARED ${variant.sheared ? 1 : 0}
+uniform int clipPlaneCount;
+uniform vec4 clipPlanes[${MOST_CLIP_PLANES}];  // in V_O's view space; the visible side has dot(xyz, position) >= w
 uniform sampler2D regions;     // regions of the picture that may show material (cull.js)
 ${variant.compact ? COMPACT_SEGMENTS : FULL_SEGMENTS}${RAYS}${INTERSECT}${TRAVERSE}${MAIN}`;
 }

@@ -5,10 +5,13 @@
 
 import {cameraText} from "./camera.js";
 import {politely} from "./decoder.js";
+import {pictureOf} from "./picture.js";
 import {Renderer} from "./renderer.js";
 
 /** @typedef {import("./format.js").Camera} Camera */
 /** @typedef {import("./decoder.js").PreparedVdi} PreparedVdi */
+/** @typedef {import("./format.js").Vec3} Vec3 */
+/** @typedef {import("./renderer.js").ClipPlane} ClipPlane */
 /** @typedef {import("./renderer.js").Color} Color */
 /** @typedef {import("./renderer.js").Frame} Frame */
 /** @typedef {import("./slopes.js").Leaning} Leaning */
@@ -46,6 +49,8 @@ export class Viewer {
     this.outlineColor = [0.5, 0.5, 0.5];
     this.outline = true;
     this.isLost = false;
+    /** @type {(bounds: [Vec3, Vec3]) => ClipPlane[]} */
+    this.planesFor = () => [];
     /** Measured milliseconds per canvas pixel. */
     this.cost = 1e-4;
     this.movedAt = -Infinity;
@@ -146,6 +151,7 @@ export class Viewer {
       const now = performance.now();
       this.stays = [now - this.shownAt, this.stays[0]];
       this.shownAt = now;
+      this.setPlanes();
       this.renew();
       this.awaitRest();
     }
@@ -358,22 +364,37 @@ export class Viewer {
   }
 
   /**
-   * The whole canvas as PNG.
-   * @returns {Promise<Blob>}
+   * Clips the scene, now and when another VDI comes.
+   * @param {(bounds: [Vec3, Vec3]) => ClipPlane[]} planesFor the planes for a scene
    */
-  screenshot() {
-    const {renderer, canvas} = this;
-    if (!this.camera) return Promise.reject(new Error("there is no picture yet"));
-    if (this.isLost) return Promise.reject(new Error("the graphics driver has lost the picture"));
-    renderer.drawPicture(this.camera, 1, 0, canvas.height, renderer.canShear());
-    renderer.finishPicture();
-    this.refresh();
+  clip(planesFor) {
+    this.planesFor = planesFor;
+    this.setPlanes();
+    this.redraw();
+  }
+
+  setPlanes() {
+    const vdi = this.renderer.loaded?.vdi;
+    this.renderer.clipPlanes = vdi && vdi.bounds[0].every((low, axis) => low <= vdi.bounds[1][axis]) ? this.planesFor(vdi.bounds) : [];
+  }
+
+  /**
+   * The picture as PNG; see pictureOf.
+   * @param {[number, number]} [size]
+   * @param {boolean} [isTransparent]
+   */
+  screenshot(size, isTransparent) {
+    return pictureOf(this, size, isTransparent);
+  }
+
+  /**
+   * Call when a whole picture has been drawn.
+   * @param {boolean} isOther whether it had another size
+   */
+  onPicture(isOther) {
     // Otherwise strips would go on in the former picture, without redrawing its first rows.
     this.nextRow = 0;
     this.outdatedAt = undefined;
-    this.missing = "nothing";
-    return new Promise((resolve, reject) => {
-      canvas.toBlob((blob) => blob ? resolve(blob) : reject(new Error("the browser can't save the picture as PNG")), "image/png");
-    });
+    this.missing = isOther ? "all" : "nothing";
   }
 }

@@ -458,6 +458,145 @@ def test_frame_time(browser):
     browser.size(WIDTH, HEIGHT)
 
 
+def png_of(browser, words):
+    """The picture of viewer.screenshot, with its alpha."""
+    return images.imread(io.BytesIO(base64.b64decode(browser.value(
+        f"vdiPage.viewer.screenshot({words}).then((blob) => new Promise((done) => {{ const reader = new FileReader();"
+        " reader.onload = () => done(reader.result.split(',')[1]); reader.readAsDataURL(blob); }))"))))
+
+
+def slide(browser, label, share):
+    browser.value(f"""(() => {{ const slider = document.querySelector('[aria-label="{label}"]');
+      slider.value = {share} * slider.max; slider.dispatchEvent(new Event('input')); }})()""")
+
+
+def test_clipping(browser):
+    """Clipping by planes shows what vdi render --clip shows."""
+    for name in ("compact", "parallel"):
+        open_page(browser, f"{name}.html")
+        whole(browser)
+        bare(browser)
+        camera = azimuth(camera_of(browser), 30)
+        browser.value(f"vdiPage.setCamera({json.dumps(camera)}, false)")
+        low, high = browser.value("vdiPage.vdi.bounds")
+        slide(browser, "Clip x from", 0.4)
+        slide(browser, "Clip z to", 0.7)
+        x, z = low[0] + 0.4 * (high[0] - low[0]), low[2] + 0.7 * (high[2] - low[2])
+        whole_picture = rendering(f"{name}.vdi", camera)
+        expected = rendering(f"{name}.vdi", camera, more=["--clip", x, 0, 0, 1, 0, 0, "--clip", 0, 0, z, 0, 0, -1])()
+        check(np.abs(whole_picture().astype(int) - expected).max() > 50, "the planes cut something off")
+        compare(f"{name}, clipped", shown(browser, f"{name}_clipped"), expected)
+    browser.value("document.querySelector('#clip button').click()")
+    compare("nothing is clipped any more", shown(browser), rendered("parallel.vdi", camera))
+
+
+def test_screenshots(browser):
+    """Screenshots of another size, and without a background."""
+    open_page(browser, "compact.html")
+    whole(browser)
+    bare(browser)
+    camera = azimuth(camera_of(browser), 20)
+    browser.value(f"vdiPage.setCamera({json.dumps(camera)}, false)")
+    final(browser)
+    size = (3 * WIDTH, 3 * HEIGHT)
+    compare("a large screenshot", png_of(browser, f"[{size[0]}, {size[1]}]")[..., :3], rendered("compact.vdi", camera, size=size))
+    compare("the view after it", shown(browser), rendered("compact.vdi", camera))
+    flat = png_of(browser, f"[{size[0]}, {size[1]}], true")
+    check(flat.shape[2] == 4 and flat[0, 0, 3] == 0 and flat[..., 3].max() > 100, f"a transparent background: {flat.shape}")
+    on_black = (flat[..., :3] * (flat[..., 3:] / 255)).round().astype(np.uint8)
+    compare("a transparent screenshot", on_black, rendered("compact.vdi", camera, size=size))
+    refused = browser.value("vdiPage.viewer.screenshot([1e6, 1]).catch((error) => error.message)")
+    check("at most" in refused, f"a size that the GPU doesn't have: {refused}")
+
+
+def test_tools(browser):
+    """Axis views, the point that the view orbits, turning, recording, links and help, by mouse, touch and keys."""
+    browser.size(640, 400)
+    open_page(browser, "compact.html")
+    whole(browser)
+
+    def direction():
+        camera = camera_of(browser)
+        way = np.subtract(camera["position"], camera["focalPoint"])
+        return np.round(way / np.linalg.norm(way), 6).tolist()
+
+    browser.key("x")
+    browser.wait("Math.abs(vdiPage.viewer.camera.position[1] - vdiPage.viewer.camera.focalPoint[1]) < 1e-9")
+    check(direction() == [1, 0, 0], f"x: {direction()}")
+    browser.key("Home")
+    browser.wait("vdiPage.viewer.camera === vdiPage.vdi.camera")
+    x, y = browser.value("(({x, y, width, height}) => [x + width / 2, y + height / 2])"
+                         "(document.querySelector('#axes [data-side=\"+z\"] .target').getBoundingClientRect())")
+    browser.drag((x, y), (x, y), steps=0)
+    browser.wait("Math.abs(vdiPage.viewer.camera.position[0] - vdiPage.viewer.camera.focalPoint[0]) < 1e-9")
+    check(direction() == [0, 0, 1], f"a click on the triad: {direction()}")
+    browser.value("document.querySelector('#sides [data-side=\"-y\"]').click()")
+    browser.wait("Math.abs(vdiPage.viewer.camera.position[2] - vdiPage.viewer.camera.focalPoint[2]) < 1e-9")
+    check(direction() == [0, -1, 0], f"a button: {direction()}")
+
+    # The pivot: on the surface that the pixel shows, and fixed in the picture while the view turns.
+    browser.key("Home")
+    browser.wait("vdiPage.viewer.camera === vdiPage.vdi.camera")
+    check(browser.value("vdiPage.pivot === undefined"), "no point is chosen at first")
+    for count in (1, 2):
+        browser.mouse("mousePressed", 330, 170, button="left", buttons=1, clickCount=count)
+        browser.mouse("mouseReleased", 330, 170, button="left", clickCount=count)
+    pivot = browser.value("vdiPage.pivot")
+    low, high = browser.value("vdiPage.vdi.bounds")
+    check(pivot and all(l - 0.1 <= p <= h + 0.1 for l, p, h in zip(low, pivot, high)), f"a double click: {pivot}, {low}, {high}")
+    check(not browser.value("document.getElementById('mark').hidden"), "the point is marked")
+
+    def place_of(point):  # the VDI's whole width stays in view, so 360 of the 400 rows are framed
+        camera = camera_of(browser)
+        forward = np.subtract(camera["focalPoint"], camera["position"])
+        forward /= np.linalg.norm(forward)
+        right = np.cross(forward, camera["viewUp"])
+        right /= np.linalg.norm(right)
+        offset = np.subtract(point, camera["position"])
+        scale = 180 / math.tan(math.radians(camera["viewAngle"] / 2)) / (offset @ forward)
+        return np.array([320 + scale * (offset @ right), 200 - scale * (offset @ np.cross(right, forward))])
+
+    check(np.allclose(place_of(pivot), (330, 170), atol=1), f"the chosen point is where the click was: {place_of(pivot)}")
+    browser.drag((100, 100), (180, 130))
+    distance = [np.linalg.norm(np.subtract(c["position"], pivot)) for c in (browser.value("vdiPage.vdi.camera"), camera_of(browser))]
+    check(abs(distance[0] - distance[1]) < 1e-6 * distance[0], f"the view orbits that point: {distance}")
+    browser.send("Emulation.setTouchEmulationEnabled", enabled=True, maxTouchPoints=2)
+    for _ in range(2):
+        browser.touch("touchStart", (300, 200))
+        browser.touch("touchEnd")
+    check(browser.value("vdiPage.pivot") != pivot, "a double tap chooses another point")
+    browser.send("Emulation.setTouchEmulationEnabled", enabled=False)
+
+    browser.value("window.saved = []; HTMLAnchorElement.prototype.click = function() { saved.push([this.download, blobs.pop()]); };"
+                  "window.blobs = []; URL.createObjectURL = (blob) => { blobs.push(blob); return 'blob:none'; }; 0")
+    browser.value("document.getElementById('view').focus()")
+    browser.key("t")
+    before = camera_of(browser)
+    browser.wait(f"vdiPage.viewer.camera.position[0] !== {before['position'][0]}")
+    browser.key("r")
+    browser.wait("!document.getElementById('recording').hidden")
+    browser.value("new Promise((done) => setTimeout(done, 700))")
+    browser.value("document.getElementById('recording').click()")
+    browser.key("t")
+    browser.wait("saved.length === 1")
+    video = browser.value("saved[0][1].arrayBuffer().then((data) => [data.byteLength, [...new Uint8Array(data).slice(0, 4)]])")
+    check(video[0] > 1000 and video[1] == [0x1A, 0x45, 0xDF, 0xA3], f"a recording is a WebM file: {video}")
+    check(browser.value("saved[0][0]").endswith(".webm"), "a recording is WebM")
+
+    browser.value("document.getElementById('link').click()")
+    link = browser.value("document.getElementById('sharelink').value")
+    check("#camera=" in link and "token" not in link, f"a link: {link}")
+    check(browser.value("document.getElementById('askfortoken').hidden"), "a page without a server has no token to share")
+    browser.value("document.getElementById('share').close(); document.getElementById('view').focus()")
+    browser.key("?")
+    check(browser.value("document.getElementById('help').open"), "the help opens by its key")
+    browser.screenshot(os.path.join(PICTURES, "help.png"))
+    browser.value("document.querySelector('#help button').click()")
+    browser.wait("!document.getElementById('help').open")
+    check(not browser.complaints(), f"tools: {browser.complaints()}")
+    browser.size(WIDTH, HEIGHT)
+
+
 def test_looks(browser):
     """Nothing is cut off, on screens of all kinds. The pictures are for people to inspect."""
     phone, desktop = (360, 640), (1000, 640)
@@ -613,5 +752,6 @@ def test_network(browser):
 if sys.argv[4:] == ["speed"]:
     run(test_frame_time)
 run(test_pictures, test_culling_perspective, test_culling_parallel, test_small_textures, test_hands,
-    test_narrow_window, test_screenshot, test_damage, test_without_webgl, test_series, test_legend, test_looks,
-    test_first_look, test_framing, test_many_contexts, test_opening, test_network)
+    test_narrow_window, test_screenshot, test_clipping, test_screenshots, test_tools, test_damage,
+    test_without_webgl, test_series, test_legend, test_looks, test_first_look, test_framing, test_many_contexts,
+    test_opening, test_network)

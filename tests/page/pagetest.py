@@ -74,7 +74,7 @@ def shown(browser, name=None):
     return images.imread(io.BytesIO(browser.screenshot(path)))[..., :3]
 
 
-def rendering(file, camera, reconstruction="sheared", size=(WIDTH, HEIGHT)):
+def rendering(file, camera, reconstruction="sheared", size=(WIDTH, HEIGHT), more=()):
     """Starts vdi render of a file from the page's camera. Returns a function that waits for its picture."""
     words = {"position": camera["position"], "focal_point": camera["focalPoint"], "view_up": camera["viewUp"]}
     if camera["parallel"]:
@@ -85,7 +85,7 @@ def rendering(file, camera, reconstruction="sheared", size=(WIDTH, HEIGHT)):
     with open(f"{name}.json", "w", encoding="utf-8") as text:
         json.dump(words, text)
     command = [VDI, "render", file, "-o", f"{name}.png", "--camera", f"{name}.json", "--resolution", f"{size[0]}x{size[1]}",
-               "--reconstruction", reconstruction]
+               "--reconstruction", reconstruction, *map(str, more)]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
     def picture():
