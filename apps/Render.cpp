@@ -11,6 +11,7 @@
 #include "apps/Cameras.h"
 #include "apps/Commands.h"
 #include "apps/FolderWatch.h"
+#include "apps/Movie.h"
 #include "apps/OutputFiles.h"
 #include "apps/Say.h"
 #include "apps/Source.h"
@@ -29,6 +30,9 @@ struct RenderOptions {
   std::string output;
   CameraOptions camera;
   std::vector<double> azimuths{0.0};
+  int orbit = 0;       // pictures of a turn; 0: none
+  std::string movie;   // file for the turn's movie; empty: none
+  double rate = 30.0;  // pictures of the movie per second
   double elevation = 0.0;
   std::string resolution;
   std::string reconstruction = toString(defaultReconstruction);
@@ -37,16 +41,36 @@ struct RenderOptions {
   std::uint64_t frames = 0;  // number of VDIs to render if `follows`; 0: no end
 };
 
-/// The path of an azimuth's picture. With several azimuths, the degrees become part of its name.
-std::filesystem::path pictureOf(const RenderOptions& options, double azimuth) {
-  if (options.azimuths.size() == 1) return options.output;
-  return withSuffix(options.output, fmt::format("{:g}deg", azimuth));
+/// One of the pictures to render.
+struct Shot {
+  double azimuth = 0.0;
+  std::filesystem::path path;  // empty: only for the movie
+};
+
+/// With several azimuths, the degrees become part of the pictures' names, and in an orbit their numbers.
+std::vector<Shot> shotsOf(const RenderOptions& options) {
+  constexpr double turn = 360.0;
+  std::vector<Shot> shots;
+  for (int i = 0; i < options.orbit; ++i) {
+    shots.push_back({options.azimuths.front() + turn * i / options.orbit,
+                     options.output.empty() ? "" : withSuffix(options.output, fmt::format("{:04}", i))});
+  }
+  if (options.orbit > 0) return shots;
+  for (const double azimuth : options.azimuths) {
+    shots.push_back({azimuth, options.azimuths.size() == 1
+                                  ? std::filesystem::path(options.output)
+                                  : withSuffix(options.output, fmt::format("{:g}deg", azimuth))});
+  }
+  return shots;
 }
 
 void requirePictures(const RenderOptions& options) {
   std::vector<NamedFile> outputs;
-  for (const double azimuth : options.azimuths)
-    outputs.push_back({fmt::format("the picture at {} degrees", azimuth), pictureOf(options, azimuth)});
+  for (const Shot& shot : shotsOf(options)) {
+    if (!shot.path.empty())
+      outputs.push_back({fmt::format("the picture at {} degrees", shot.azimuth), shot.path});
+  }
+  if (!options.movie.empty()) outputs.push_back({"--movie", options.movie});
   requireOutputs(outputs, {{"the VDI", options.input}, {"--camera", options.camera.file}});
 }
 
@@ -56,6 +80,7 @@ class Painter {
   explicit Painter(const RenderOptions& options)
       : options_(options),
         reconstruction_(reconstructionFromString(options.reconstruction)),
+        shots_(shotsOf(options)),
         renderer_(gpu::Device::create(gpu::requestFromEnvironment(0))) {
     renderer_.setClipPlanes(makeClipPlanes(options.clip));
   }
@@ -66,21 +91,29 @@ class Painter {
                                                               : parseSizes(options_.resolution, 2);
     renderer_.setVdi(vdi);
     const Camera start = chosenCamera(options_.camera, vdi.camera);
-    for (const double azimuth : options_.azimuths) {
+    std::optional<Movie> movie;
+    if (!options_.movie.empty()) movie.emplace(options_.movie, size[0], size[1], options_.rate);
+    for (const auto& [azimuth, path] : shots_) {
       const Camera camera = turned(start, azimuth, options_.elevation);
       const auto issue = viewpointIssue(vdi.bounds, vdi.view(), View(camera, size[0], size[1]));
       if (issue && warned_.insert(*issue).second)
         say(fmt::format("warning: at {} degrees: {}", azimuth, describe(*issue)));
-      const std::filesystem::path path = pictureOf(options_, azimuth);
-      io::writePng(path, io::toPicture(renderer_.renderBytes(camera, size[0], size[1], Alpha::Premultiplied,
-                                                             reconstruction_)));
+      const io::Picture made = io::toPicture(
+          renderer_.renderBytes(camera, size[0], size[1], Alpha::Premultiplied, reconstruction_));
+      if (movie) movie->add(made);
+      if (path.empty()) continue;
+      io::writePng(path, made);
       fmt::print("{}: {:.2f} ms on the device\n", printable(path.string()), renderer_.renderMilliseconds());
     }
+    if (!movie) return;
+    movie->finish();
+    fmt::print("{}: {} pictures\n", printable(options_.movie), shots_.size());
   }
 
  private:
   const RenderOptions& options_;
   Reconstruction reconstruction_;
+  std::vector<Shot> shots_;
   VdiRenderer renderer_;
   std::set<ViewpointIssue> warned_;
 };
@@ -134,22 +167,26 @@ void render(const RenderOptions& options) {
 }  // namespace
 
 void addRender(CLI::App& app, Job& job) {
+  constexpr int mostPictures = 9999;
   CLI::App* command = app.add_subcommand("render", "Render a VDI from new viewpoints to PNG");
   command->footer(
       "Example:\n"
       "  vdi render coil.vdi -o coil.png --azimuth 0 5 20 50\n"
       "writes coil_0deg.png, coil_5deg.png, coil_20deg.png and coil_50deg.png.\n"
       "  vdi render --follow results/ -o now.png\n"
-      "keeps a picture of the newest VDI in results/ while a simulation writes there.");
+      "keeps a picture of the newest VDI in results/ while a simulation writes there.\n"
+      "  vdi render coil.vdi --orbit 240 --movie coil.webm\n"
+      "makes a movie of one turn with the program ffmpeg.");
   const auto options = std::make_shared<RenderOptions>();
   command->add_option("input", options->input, "the .vdi file; with --follow, a folder")
       ->type_name("")
       ->required();
-  command
-      ->add_option("-o,--output", options->output,
-                   "PNG; with several azimuths, the degrees become part of its name")
-      ->type_name("FILE")
-      ->required();
+  CLI::Option* const output =
+      command
+          ->add_option(
+              "-o,--output", options->output,
+              "PNG; with several azimuths, the degrees become part of its name, with --orbit a number")
+          ->type_name("FILE");
   command
       ->add_option("--resolution", options->resolution, "size in pixels; default: that of the VDI's picture")
       ->type_name("WxH");
@@ -164,16 +201,45 @@ void addRender(CLI::App& app, Job& job) {
   command->add_option("--elevation", options->elevation, "degrees by which to raise the camera afterwards")
       ->capture_default_str()
       ->group("Viewpoint");
+  CLI::Option* const orbit = command
+                                 ->add_option("--orbit", options->orbit,
+                                              "number of pictures of a whole turn, which begins at --azimuth")
+                                 ->check(CLI::Range(1, mostPictures))
+                                 ->type_name("N")
+                                 ->group("Viewpoint");
+  CLI::Option* const movie =
+      command
+          ->add_option(
+              "--movie", options->movie,
+              std::string(
+                  "with --orbit: also, or in place of -o, a movie made by ffmpeg, whose name ends in ") +
+                  movieExtensions)
+          ->type_name("FILE")
+          ->needs(orbit);
+  command->add_option("--rate", options->rate, "with --movie: pictures per second")
+      ->check(CLI::Range(1.0, 240.0))
+      ->capture_default_str()
+      ->needs(movie);
   addReconstructionOption(*command, options->reconstruction);
   addClipOption(*command, options->clip, "Viewpoint");
   CLI::Option* follows =
-      command->add_flag("--follow", options->follows,
-                        "render the newest VDI of a folder whenever a file appears, until Ctrl+C");
+      command
+          ->add_flag("--follow", options->follows,
+                     "render the newest VDI of a folder whenever a file appears, until Ctrl+C")
+          ->excludes(orbit);
   command
       ->add_option("--frames", options->frames,
                    "with --follow: number of VDIs after which to end; default: 0, never")
       ->needs(follows);
-  command->callback([options, &job] { job = {[options](const comm::Communicator&) { render(*options); }}; });
+  command->callback([options, output, movie, &job] {
+    if (output->count() == 0 && movie->count() == 0)
+      throw CLI::RequiredError("--output, or --orbit with --movie");
+    if (options->orbit > 0 && options->azimuths.size() != 1)
+      throw CLI::ValidationError("--orbit", "takes one --azimuth, at which it begins");
+    if (movie->count() > 0 && !isMovie(options->movie))
+      throw CLI::ValidationError("--movie", std::string("the name must end in ") + movieExtensions);
+    job = {[options](const comm::Communicator&) { render(*options); }};
+  });
 }
 
 }  // namespace vdi::apps

@@ -216,6 +216,25 @@ works "past it" "$vdi" render one.vdi -o x.png --position 9 9 9 --focal-point 20
 [ "$(warnings "doesn't see")" -eq 1 ] || { fail "past it: no warning"; cat err.txt; }
 rm -f x.png x_*.png
 
+# A turn, as numbered pictures and as a movie. Encoding changes the pictures a little.
+works "an orbit" "$vdi" render one.vdi --orbit 8 -o turn.png --azimuth 20
+[ "$(find . -name 'turn_*.png' | wc -l)" -eq 8 ] || fail "an orbit of 8 pictures has another number"
+works "a quarter later" "$vdi" render one.vdi -o quarter.png --azimuth 110
+cmp turn_0002.png quarter.png || fail "the third of 8 pictures isn't a quarter of a turn later"
+refused 1 "needs the program ffmpeg" env PATH=/nowhere "$vdi" render one.vdi --orbit 8 --movie turn.webm
+if command -v ffmpeg >/dev/null; then
+  works "a movie" "$vdi" render one.vdi --orbit 8 --movie turn.webm --azimuth 20 --rate 4
+  works "its last picture" ffmpeg -loglevel error -y -ss 1.75 -i turn.webm -frames:v 1 last.png
+  compared "the movie's pictures aren't those of the orbit" "c['ssim'] > 0.9" turn_0007.png last.png
+fi
+refused 1 "No such file" "$vdi" render one.vdi --orbit 8 --movie no-such-folder/turn.webm
+refused 2 "must end in" "$vdi" render one.vdi --orbit 8 --movie turn.png
+refused 2 "orbit" "$vdi" render one.vdi --movie turn.webm
+refused 2 "one --azimuth" "$vdi" render one.vdi --orbit 8 -o x.png --azimuth 0 20
+refused 2 "output" "$vdi" render one.vdi --orbit 8
+[ -z "$(find . -name '*.part*')" ] || fail "parts of movies are left"
+rm -f turn* quarter.png last.png
+
 # Pipes given as input are refused, not waited for.
 mkfifo pipe pipe.json
 for option in "--camera pipe" "--transfer-function pipe.json"; do
