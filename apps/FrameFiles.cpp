@@ -13,6 +13,7 @@
 #include <system_error>
 
 #include "vdi/core/Error.h"
+#include "vdi/core/Estimate.h"
 #include "vdi/io/Files.h"
 #include "vdi/io/VdiFile.h"
 
@@ -151,11 +152,18 @@ void FrameFiles::tellIncomplete() {
   }
 }
 
-/// Throws Error as io::readVdiInfo does.
+/// Throws Error as io::readVdiInfo does, and OutOfMemory for a VDI that viewers' pages can't hold.
 FrameFiles::Content FrameFiles::contentOf(const std::filesystem::path& file) {
   Content content;
   content.look = lookAt(file).value_or(FileLook());  // before reading, so that a later change shows
   const io::VdiFileInfo info = io::readVdiInfo(file);
+  try {
+    requireFitsPages(std::uint64_t{static_cast<std::uint32_t>(info.header.width)} *
+                         static_cast<std::uint32_t>(info.header.height),
+                     info.supersegmentCount, info.header.precision());
+  } catch (const Error& error) {
+    throw Error(error.code(), error.what(), file.string());
+  }
   if (std::isfinite(info.header.time)) content.time = info.header.time;
   content.step = info.header.timeStep;
   content.checksum = info.checksum;

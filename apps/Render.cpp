@@ -132,7 +132,9 @@ std::optional<Vdi> newestOf(const std::vector<std::filesystem::path>& files) {
       fmt::print("{}\n", printable(file->string()));
       return vdi;
     } catch (const Error& error) {
-      if (error.code() != ErrorCode::Io && error.code() != ErrorCode::Format) throw;
+      if (error.code() != ErrorCode::Io && error.code() != ErrorCode::Format &&
+          error.code() != ErrorCode::OutOfMemory)
+        throw;
       say(fmt::format("{}; skipped for now", error.what()));
     }
   }

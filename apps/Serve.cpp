@@ -41,6 +41,7 @@ struct ServeOptions {
   std::string key;
   std::vector<std::string> origins;
   std::vector<std::string> embedders;
+  std::string title = "Live";
   std::string rate;
   std::uint32_t viewers = 64;
   bool isFinished = false;
@@ -119,7 +120,7 @@ stream::ServerOptions serverOf(const ServeOptions& options, const std::string& k
   server.host = options.host;
   server.port = options.port;
   server.token = known.empty() ? stream::randomToken() : known;
-  server.page = page::emptyPage("Live");
+  server.page = page::emptyPage(options.title);
   server.origins = options.origins;
   server.originOption = "--origin {}";
   server.embedders = options.embedders;
@@ -160,6 +161,11 @@ void addServerOptions(CLI::App& command, ServeOptions& options) {
       ->capture_default_str();
   command.add_option("--port", options.port, "port to listen at; 0: any free one")->capture_default_str();
   addTokenOption(command, options.tokenFile, "default: a new token, which is part of the link");
+  command
+      .add_option("--title", options.title,
+                  "title of the page and its tab, which whoever reaches the port can read")
+      ->type_name("TEXT")
+      ->capture_default_str();
   command.add_option("--rate", options.rate, "limit per viewer and second, such as 100Mbit or 5MB")
       ->type_name("RATE")
       ->check(requireRate);
@@ -213,7 +219,8 @@ void addServe(CLI::App& app, Job& job) {
                                             "serve one viewer at standard input and output instead of a port")
                                  ->excludes(from);
   for (const char* const name :
-       {"--host", "--port", "--token-file", "--certificate", "--key", "--origin", "--embed-in"})
+       {"--host", "--port", "--token-file", "--certificate", "--key", "--origin", "--embed-in",
+        "--title"})
     stdio->excludes(command->get_option(name));
   command->callback([options, &job] {
     if (options->inputs.empty() && options->from.empty())

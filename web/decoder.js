@@ -32,7 +32,7 @@ import {unpack} from "./unpack.js";
  */
 
 const GIB = 2 ** 30;
-const PAGE_BYTES = 1.5 * GIB;   // for a VDI, mostPageBytes of vdi/stream/Frame.h
+const PAGE_BYTES = 1.5 * GIB;   // for a VDI, mostPageBytes of vdi/core/Estimate.h
 const MEMORY_SHARE = 0.4;       // of the machine's memory
 const USUAL_MEMORY = 4;         // GiB, where the browser doesn't tell
 const LIST_BYTES = 4 + 16;      // offset and head

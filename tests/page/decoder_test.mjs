@@ -172,6 +172,31 @@ async function testMetadata(/** @type {Uint8Array} */ whole) {
   }
 }
 
+/** A small file of side * side empty lists, in the manner of `file`. */
+function emptyLists(/** @type {Uint8Array} */ file, /** @type {number} */ side) {
+  const perChunk = 4096, lists = side * side, count = Math.ceil(lists / perChunk);
+  const code = [0, 0, 128, 63, 111, 18, 131, 58];  // depths begin at 1, in steps of 0.001
+  const chunks = [perChunk, lists - (count - 1) * perChunk].map((length) => {
+    const match = 8 + 4 * length - 9 - 5 - 4 - 15;  // zeros after the first one and before the last five
+    return [0x9f, ...code, 0, 1, 0, ...Array(Math.floor(match / 255)).fill(255), match % 255, 0x50, 0, 0, 0, 0, 0];
+  });
+  const table = 240 + 16 * count, bytes = new Uint8Array(table + chunks[0].length * (count - 1) + chunks[1].length);
+  bytes.set(file.subarray(0, 240));
+  const view = new DataView(bytes.buffer);
+  view.setUint32(8, 1, true);
+  [side, side, 8, perChunk, count].forEach((value, i) => view.setUint32(24 + 4 * i, value, true));
+  view.setBigUint64(48, 0n, true);
+  view.setBigUint64(56, BigInt(bytes.length - table), true);
+  for (let c = 0, at = table; c < count; ++c) {
+    const chunk = chunks[c + 1 < count ? 0 : 1];
+    view.setUint32(244 + 16 * c, chunk.length, true);
+    bytes.set(chunk, at);
+    at += chunk.length;
+  }
+  seal(bytes);
+  return bytes;
+}
+
 /** A VDI that takes too much memory, or more than a texture holds, is refused before memory is allocated. */
 async function testRoom(/** @type {Uint8Array} */ file) {
   const bytes = file.slice(0, 240);
@@ -198,8 +223,15 @@ async function testRoom(/** @type {Uint8Array} */ file) {
   if (refusal(3840, 2160, 40e6) !== "") fail(`a VDI of 4K: ${refusal(3840, 2160, 40e6)}`);
   if (!refusal(14000, 14000, 0).includes("3.7 GiB")) fail(`many empty lists: ${refusal(14000, 14000, 0)}`);
   if (!refusal(1920, 1080, 400e6).includes("supersegments, which take 3.0 GiB")) fail(`many supersegments: ${refusal(1920, 1080, 400e6)}`);
-  decoder.room.elements = 1e6;
+  decoder.room = {...decoder.room, elements: 1e6};
   if (!refusal(1920, 1080, 0).includes("a texture of this GPU holds 1,000,000")) fail(`a small GPU: ${refusal(1920, 1080, 0)}`);
+  // Commands that make and serve pages refuse it, too.
+  const large = join(folder, "large.vdi");
+  writeFileSync(large, emptyLists(file, 10000));
+  for (const words of [["serve", large], ["export", large, "-o", join(folder, "large.html")]]) {
+    const {status, stderr} = spawnSync(vdi, words, {timeout: 60000});
+    if (status !== 1 || !String(stderr).includes("100000000 lists and 0 supersegments take 1.9 GiB of at most 1.5")) fail(`${words}: ${stderr}`);
+  }
   let asked = 0;
   const isAsked = await decodeVdi(file, () => {
     ++asked;

@@ -1,6 +1,10 @@
 #include "vdi/core/Estimate.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+
+#include "vdi/core/Error.h"
 
 namespace vdi {
 
@@ -23,6 +27,18 @@ double samplesOf(const GenerateSettings& settings, double automatic) {
 }
 
 }  // namespace
+
+void requireFitsPages(std::uint64_t lists, std::uint64_t supersegments, Precision precision) {
+  constexpr double gibibyte = 1024.0 * 1024.0 * 1024.0;
+  const std::uint64_t bytes = bytesInPage(lists, supersegments, precision);
+  if (bytes <= mostPageBytes) return;
+  throw Error(
+      ErrorCode::OutOfMemory,
+      fmt::format("pages can't hold the VDI: its {} lists and {} supersegments take {:.1f} GiB of at most "
+                  "{:.1f}",
+                  lists, supersegments, static_cast<double>(bytes) / gibibyte,
+                  static_cast<double>(mostPageBytes) / gibibyte));
+}
 
 VdiEstimate estimateOf(const GenerateSettings& settings, const std::optional<MadeVdi>& last) {
   double lists = listsOf(settings);

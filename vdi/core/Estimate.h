@@ -17,6 +17,18 @@ constexpr Number bytesInMemory(Number lists, Number supersegments, Precision pre
          supersegments * static_cast<Number>(segmentBytes(precision));
 }
 
+/// The bytes that a VDI takes in a page, as requireRoom has it in web/decoder.js.
+constexpr std::uint64_t bytesInPage(std::uint64_t lists, std::uint64_t supersegments, Precision precision) {
+  constexpr std::uint64_t list = 20;
+  constexpr std::uint64_t full = 40;
+  constexpr std::uint64_t compact = 8;
+  return lists * list + supersegments * (precision == Precision::Full ? full : compact);
+}
+/// The bytes that a page has for a VDI, PAGE_BYTES in web/decoder.js.
+inline constexpr std::uint64_t mostPageBytes = std::uint64_t{3} << 29U;
+/// Throws Error{OutOfMemory} for a VDI that takes more than mostPageBytes.
+void requireFitsPages(std::uint64_t lists, std::uint64_t supersegments, Precision precision);
+
 /// Settings and figures of a finished VDI.
 struct MadeVdi {
   GenerateSettings settings;  // samplesPerVoxel is the rate in use, never automaticRate

@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "vdi/core/FreeMemory.h"
 #include "vdi/core/Parallel.h"
 #include "vdi/io/VdiLayout.h"
 
@@ -63,6 +64,7 @@ std::size_t VdiDecoder::State::use(std::span<const std::byte> bytes) {
     if (!isThere(detail::tableBytesOf(*header))) return used;
     chunks = detail::parseTable(*header, bytes.subspan(used));
     used += detail::tableBytesOf(*header);
+    requireHostBytes(detail::bytesInMemoryOf(*header), "the VDI");
   }
   used += useChunks(bytes.subspan(used));
   const std::uint64_t rest = fileBytes - detail::metadataOffset(*header);

@@ -158,8 +158,7 @@ VdiFileInfo infoOf(const Header& header, std::optional<Coloring> coloring, std::
   info.header.coloring = std::move(coloring);
   info.supersegmentCount = header.supersegmentCount;
   info.storedBytes = fileBytes;
-  info.expandedBytes = bytesInMemory<std::uint64_t>(std::uint64_t{header.width} * header.height + 1,
-                                                    header.supersegmentCount, precisionOf(header));
+  info.expandedBytes = detail::bytesInMemoryOf(header);
   info.checksum = header.headerChecksum;
   return info;
 }
@@ -178,14 +177,14 @@ void preferLargePages(std::span<std::byte> memory) {
     (void)::madvise(first, bytes / page * page, MADV_HUGEPAGE);
 }
 
-/// Runs `work` with the path as the context of its Format errors.
+/// Runs `work` with the path as the context of errors that the file's content causes.
 template <typename Work>
 auto withPath(const std::filesystem::path& path, Work work) {
   try {
     return work();
   } catch (const Error& error) {
-    if (error.code() != ErrorCode::Format) throw;
-    throw Error(ErrorCode::Format, error.what(), path.string());
+    if (error.code() != ErrorCode::Format && error.code() != ErrorCode::OutOfMemory) throw;
+    throw Error(error.code(), error.what(), path.string());
   }
 }
 

@@ -32,7 +32,8 @@ std::vector<std::byte> encode(const Vdi& vdi);
 std::optional<std::vector<std::byte>> encodeWhile(const Vdi& vdi, const std::function<bool()>& goesOn);
 /// Throws Error{Format} for bytes that are truncated, altered, of another version or encoding, or whose
 /// header or chunk table asks for more memory than the chunks can expand to (checked before allocation; they
-/// expand at most 255 times). The result has passed validate(Vdi).
+/// expand at most 255 times), Error{OutOfMemory} for one that takes more memory than is available. The result
+/// has passed validate(Vdi).
 Vdi decode(std::span<const std::byte> bytes);
 /// Decodes a VDI for each of the factors, which are at least 1. It keeps about one list in `factor` of each
 /// row and of each column, unchanged. Throws as decode does, also for faults outside the lists that are kept.
@@ -45,7 +46,7 @@ VdiFileInfo decodeInfo(std::span<const std::byte> bytes);
 /// Writes the file atomically: a reader never sees half a file, and an existing file stays if writing fails.
 /// Throws Error{Io}, or Error{Format} as encode; both with the path as context.
 void writeVdi(const std::filesystem::path& path, const Vdi& vdi);
-/// Throws Error{Io} or Error{Format} with the path as context.
+/// Throws Error{Io}, or Error{Format} and Error{OutOfMemory} as decode; with the path as context.
 Vdi readVdi(const std::filesystem::path& path);
 /// decodeInfo of a file, without reading the lists. Throws Error{Io} or Error{Format} with the path as
 /// context.

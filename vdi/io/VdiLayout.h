@@ -14,6 +14,7 @@
 
 #include "vdi/core/Encoding.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Estimate.h"
 #include "vdi/core/Vdi.h"
 #include "vdi/io/ListCodec.h"
 #include "vdi/io/VdiParts.h"
@@ -120,6 +121,12 @@ inline std::uint64_t tableBytesOf(const Header& header) {
 /// Offset of the metadata in the file, or the file's end.
 inline std::uint64_t metadataOffset(const Header& header) {
   return sizeof(Header) + tableBytesOf(header) + header.dataBytes;
+}
+
+/// Bytes of the decoded lists.
+inline std::uint64_t bytesInMemoryOf(const Header& header) {
+  return bytesInMemory<std::uint64_t>(std::uint64_t{header.width} * header.height + 1,
+                                      header.supersegmentCount, precisionOf(header));
 }
 
 /// Checks what validate(Vdi) does not: a usable camera and finite numbers.

@@ -11,9 +11,11 @@
 
 #include "PageTemplate.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/Estimate.h"
 #include "vdi/core/Markup.h"
 #include "vdi/core/Parallel.h"
 #include "vdi/io/Files.h"
+#include "vdi/io/VdiFile.h"
 #include "vdi/page/PlainChunks.h"
 
 namespace vdi::page {
@@ -108,7 +110,12 @@ Shell shellOf(const std::string& title, std::string_view connect) {
 
 std::string elementOf(const PageFrame& frame) {
   constexpr std::size_t longestText = (std::size_t{1} << 29U) - 64;  // of a string in Chromium
-  const std::vector<std::byte> plain = withPlainChunks(frame.file());
+  const std::vector<std::byte> file = frame.file();
+  const io::VdiFileInfo info = io::decodeInfo(file);
+  requireFitsPages(
+      static_cast<std::uint64_t>(info.header.width) * static_cast<std::uint64_t>(info.header.height),
+      info.supersegmentCount, info.header.precision());
+  const std::vector<std::byte> plain = withPlainChunks(file);
   const std::vector<std::byte> packed = deflated(plain);
   if (packed.size() / 3 * 4 + 4 > longestText)
     throw Error(ErrorCode::Io, "the VDI is too large for a page", frame.name);
@@ -154,8 +161,8 @@ void writePage(const std::filesystem::path& path, const std::string& title,
     try {
       writer.write(elementOf(frame));
     } catch (const Error& error) {
-      if (error.code() != ErrorCode::Format) throw;
-      throw Error(ErrorCode::Format, error.what(), frame.name);
+      if (error.code() != ErrorCode::Format && error.code() != ErrorCode::OutOfMemory) throw;
+      throw Error(error.code(), error.what(), frame.name);
     }
   }
   writer.write(shell.after);

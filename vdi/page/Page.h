@@ -22,8 +22,9 @@ std::vector<PageFrame> framesOf(std::span<const std::filesystem::path> files);
 /// Writes the page with `frames` in their order, as io::OutputFile does: `path` has its old content, or none,
 /// until all of the page is on the disk. Equal frames and titles give equal bytes on every machine with the
 /// same zlib. One frame is in memory at a time. Throws Error{InvalidArgument} without frames, Error{Format}
-/// for one that io::decode refuses, Error{Io} for one that takes more text than browsers hold (512 MB), for
-/// files that can't be read, and for `path`.
+/// for one that io::decode refuses, Error{OutOfMemory} for one that takes too much memory in a page,
+/// Error{Io} for one that takes more text than browsers hold (512 MB), for files that can't be read, and for
+/// `path`.
 void writePage(const std::filesystem::path& path, const std::string& title,
                std::span<const PageFrame> frames);
 
