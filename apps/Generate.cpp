@@ -12,6 +12,7 @@
 #include "apps/Help.h"
 #include "apps/OutputFiles.h"
 #include "apps/RawVolume.h"
+#include "apps/Say.h"
 #include "apps/Source.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
@@ -177,7 +178,9 @@ class Series {
                                          : rawArray(options_.raws.front());
       shot.camera = makeCamera(options_.view, generator_.scene());
       shot.function = makeTransferFunction(options_.quality, generator_.scene(), generator_.scalarRange());
-      if (world_.rank() == 0) noteRange(shot.function);
+      if (world_.rank() != 0) return;
+      noteRange(shot.function);
+      if (const std::string loss = describeLoss(shot.function); !loss.empty()) say("warning: " + loss);
     });
     // While one step's frame is made, the next step travels to the device, and the step after that
     // is read.

@@ -164,7 +164,9 @@ struct RunEngine::State {
   std::unique_ptr<stream::LiveStream> stream;  // the root's
   std::unique_ptr<io::CinemaIndex> cinema;     // the root's
   std::optional<RunSteering> steering;
-  std::optional<ScalarRange> firstRange;    // the colours' range, unless the run has one
+  std::optional<ScalarRange> firstRange;  // the colours' range, unless the run has one
+  TransferFunction lastFunction;          // of the last frame, and what it has lost
+  std::string lastLoss;
   std::optional<double> firstUnitDistance;  // the opacities', unless the run has one
   std::optional<LoadedFrame> frame;         // the frame whose values the device has
   bool isAskedFor = false;                  // a viewer waits for a view, which the next step shows
@@ -547,7 +549,15 @@ void RunEngine::deliver(const config::RunCamera& camera, bool isForFiles, runlog
     if (isForFiles && run_.vdi) file = run_.vdi->path(frame.step, camera.name);
     from = run_.cameraAt(camera, frame.step, frame.time, generator.scene().bounds);
     function = run_.transferFunction(map_, frame.range, frame.unitDistance);
-    if (!isRoot || !isForFiles) return;
+    if (!isRoot) return;
+    if (function != state.lastFunction) {
+      state.lastFunction = function;
+      const std::string loss = describeLoss(function);
+      if (!loss.empty() && loss != state.lastLoss)
+        std::fprintf(stderr, "vdi_catalyst: field '%s': %s\n", run_.field.c_str(), loss.c_str());
+      state.lastLoss = loss;
+    }
+    if (!isForFiles) return;
     for (const config::FilePattern* pattern : patternsOf(run_))
       makeFolderOf(pattern->path(frame.step, camera.name));
   });

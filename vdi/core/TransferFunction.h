@@ -2,7 +2,9 @@
 // vtkPiecewiseFunction with vtkVolumeProperty::ScalarOpacityUnitDistance.
 #pragma once
 
+#include <cstddef>
 #include <glm/glm.hpp>
+#include <string>
 #include <vector>
 
 namespace vdi {
@@ -100,5 +102,8 @@ struct TransferTable {
 /// step on, both forms have the values behind the step. Up to the step, pieces have the values in front of
 /// it, and entries up to one entry before.
 TransferTable bake(const TransferFunction& transferFunction);
+
+/// A sentence about the nodes that the table has lost; empty if it shows all of the function.
+std::string describeLoss(const TransferFunction& transferFunction);
 
 }  // namespace vdi

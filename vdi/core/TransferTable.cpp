@@ -1,5 +1,7 @@
 // Bakes transfer functions. First the function is cut into stretches that are linear in associated colour and
 // extinction, which shows all of it; the table's form then depends on how short they are.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cassert>
@@ -319,6 +321,21 @@ TransferTable bake(const TransferFunction& transferFunction) {
   fillEntries(transferFunction, steps, table);
   fillMeans(transferFunction, stretches, table);
   return table;
+}
+
+std::string describeLoss(const TransferFunction& transferFunction) {
+  const std::vector<double> lost = bake(transferFunction).lost;
+  if (lost.empty()) return {};
+  constexpr std::size_t most = 5;
+  std::string scalars;
+  for (std::size_t i = 0; i < std::min(lost.size(), most); ++i)
+    scalars += fmt::format("{}{:.15g}", i > 0 ? ", " : "", lost[i]);
+  if (lost.size() > most) scalars += fmt::format(" and {} more", lost.size() - most);
+  return fmt::format(
+      "the picture doesn't show the transfer function's own colour at {}: the 32-bit floats on the device "
+      "can't "
+      "tell these scalars from their neighbours; number the labels anew, from 0",
+      scalars);
 }
 
 double TransferTable::positionOf(double scalar) const {

@@ -59,7 +59,8 @@ struct vtkVDIGenerator::Internals {
   pv::LastVdiNumbers Last{};
   pv::Failure Said;
   pv::DefaultRange Range;
-  pv::Regeneration Regeneration;  // last member, because its thread uses the others
+  std::pair<vdi::TransferFunction, std::string> Loss;  // the last frame's function, and what it loses
+  pv::Regeneration Regeneration;                       // last member, because its thread uses the others
 };
 
 vtkVDIGenerator::vtkVDIGenerator()
@@ -476,11 +477,24 @@ pv::FrameInputs vtkVDIGenerator::AskedFrame() {
   // A thread must not make a communicator of several ranks.
   if (this->Internal->Use.volume()->hasRanks()) this->Internal->Use.volume()->make();
   this->Internal->Range.noteChoice(asked.load.of.choice);
-  return this->CurrentFrame(asked.bounds, asked.load.voxelVolume, {0.0, 1.0});
+  return this->Announced(this->CurrentFrame(asked.bounds, asked.load.voxelVolume, {0.0, 1.0}));
 }
 
 pv::FrameInputs vtkVDIGenerator::ShownFrame(const pv::Shown& shown) {
-  return this->CurrentFrame(shown.bounds, shown.voxelVolume, this->Internal->Range.rangeOf(shown));
+  return this->Announced(
+      this->CurrentFrame(shown.bounds, shown.voxelVolume, this->Internal->Range.rangeOf(shown)));
+}
+
+/// Warns of what the frame's transfer function loses, once for each function.
+pv::FrameInputs vtkVDIGenerator::Announced(pv::FrameInputs frame) {
+  auto& [function, loss] = this->Internal->Loss;
+  if (frame.function == function) return frame;
+  function = frame.function;
+  const std::string now = vdi::describeLoss(function);
+  const bool isRoot = this->Controller == nullptr || this->Controller->GetLocalProcessId() == 0;
+  if (isRoot && !now.empty() && now != loss) vtkWarningMacro(<< now);
+  loss = now;
+  return frame;
 }
 
 /// Ends the use of the volume by this filter's thread. Returns whether the thread has made exactly this

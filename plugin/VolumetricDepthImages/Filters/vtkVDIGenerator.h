@@ -118,6 +118,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkVDIProperties 
   void ShowBlocks(vtkDataObject* input, const pv::Origin& origin);
   pv::FrameInputs AskedFrame();
   pv::FrameInputs ShownFrame(const pv::Shown& shown);
+  pv::FrameInputs Announced(pv::FrameInputs frame);
   pv::Origin OriginOf(vtkDataObject* input);
   bool TakePreparation(const pv::Origin& origin, vtkImageData* output);
   int GiveMade(const pv::Origin& origin, vtkImageData* output);
