@@ -9,6 +9,7 @@ import {save} from "./picture.js";
 const SECONDS_PER_TURN = 12;
 const FRAMES_PER_SECOND = 30;
 const BITS_PER_SECOND = 12e6;
+const PART_MS = 500;  // the browser hands the video over in parts of this length
 const FORMATS = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm", "video/mp4"];
 
 /**
@@ -92,7 +93,7 @@ export class Recorder {
       const type = recorder.mimeType.split(";")[0] || "video/webm";
       save(new Blob(parts, {type}), type.split("/")[1]);
     });
-    recorder.start();
+    recorder.start(PART_MS);
     this.recorder = recorder;
     this.onChange();
   }

@@ -9,7 +9,8 @@ import subprocess
 import sys
 import urllib.request
 
-from pagetest import HEIGHT, PICTURES, VDI, WIDTH, azimuth, bare, camera_of, check, compare, message_of, rendered, run, shown, vdi, whole
+from pagetest import (HEIGHT, PICTURES, VDI, WIDTH, azimuth, bare, camera_of, check, compare, message_of, rendered, run, shown,
+                      vdi, whole)
 
 sys.path.append(str(pathlib.Path(__file__).parents[1] / "stream"))
 from proxy import BARE, NGINX, USUAL, Nginx, example  # noqa: E402
@@ -321,8 +322,8 @@ def check_phone(browser):
     browser.size(360, 640)
     whole(browser)
     browser.screenshot(os.path.join(PICTURES, "steer_phone.png"))
-    places = browser.value("""['#view', '#steer > div', '#bar'].map((name) => document.querySelector(name).getBoundingClientRect())
-      .map(({top, bottom}) => [top, bottom])""")
+    places = browser.value("""['#view', '#steer > div', '#bar']
+      .map((name) => document.querySelector(name).getBoundingClientRect()).map(({top, bottom}) => [top, bottom])""")
     check(places[0][1] <= places[1][0] + 1 and places[0][1] > 250 and places[1][1] <= places[2][0],
           f"picture, panel and bar don't overlap: {places}")
     browser.size(WIDTH, HEIGHT)
@@ -376,15 +377,25 @@ def test_steering(browser):
         check(words in line(browser), f"the line has what is pending: {line(browser)}")
         check(browser.value("document.getElementById('halt').textContent") == "Pausing…", "a pause is pending")
         browser.wait(f"{requested}.includes('s ago')", SECONDS)
-        browser.value("""wire.say({driver: 2, paused: true, period: 3, parameters: [{name: "feed", whole: false, value: 0.1, low: 0,
-          high: 0.1}], generator: {resolution: [960, 540], supersegments: 1024, range: [0, 0.2500000001], presets: ["X Ray"],
-          preset: "X Ray"}})""")
+        browser.value("""wire.say({driver: 2, paused: true, period: 3, parameters: [{name: "feed", whole: false, value: 0.1,
+          low: 0, high: 0.1}], generator: {resolution: [960, 540], supersegments: 1024, range: [0, 0.2500000001],
+          presets: ["X Ray"], preset: "X Ray"}})""")
         check(browser.value(requested) == "", f"all is in force: {browser.value(requested)}")
         check(browser.value("document.getElementById('preset').value") == "X Ray", "the colour map in force")
         browser.value("document.getElementById('halt').click()")
         check("go on requested" in browser.value(requested), f"pending: {browser.value(requested)}")
-        browser.value("wire.onmessage({data: JSON.stringify({type: 'denied', cause: 'no'})}); wire.say({driver: 2, paused: true})")
-        check(browser.value(requested) == "" and asked() == [{"type": "steer", "paused": False}], "a refused request isn't pending")
+        browser.value("wire.onmessage({data: JSON.stringify({type: 'denied', cause: 'no'})});"
+                      " wire.say({driver: 2, paused: true})")
+        check(browser.value(requested) == "" and asked() == [{"type": "steer", "paused": False}],
+              "a refused request isn't pending")
+        # A link has the token only on demand.
+        link = "document.getElementById('sharelink').value"
+        browser.value("document.getElementById('link').click()")
+        check("token" not in browser.value(link), f"a link without the token: {browser.value(link)}")
+        browser.value("document.getElementById('sharetoken').click()")
+        check(f"#token={TOKEN}&camera=" in browser.value(link), "a link with the token")
+        browser.value("document.getElementById('share').close()")
+        browser.wait(f"{link} === ''", SECONDS)
         near, far = azimuth(camera_of(browser), 10), azimuth(camera_of(browser), 40)
 
         def rest_at(camera):
