@@ -184,11 +184,6 @@ def log_error(text):
     vtkLogger.Log(vtkLogger.VERBOSITY_ERROR, "script", 0, text)
 
 
-def log_warning(text):
-    from vtkmodules.vtkCommonCore import vtkLogger
-    vtkLogger.Log(vtkLogger.VERBOSITY_WARNING, "script", 0, text)
-
-
 class Loading:
     """The script that is being loaded, and what the loaded ones have made."""
 
@@ -241,55 +236,20 @@ def forget_scripts():
     loading.forget_all()
 
 
-class Missed:
-    """The steps that were handed over before the first one that an extractor takes."""
-
-    count = 0
-    last = None
-    is_over = False  # it has taken one, or a warning was given
-
-
 class Extracts:
     """Prepares the files of a step before the engine writes them."""
 
     def __init__(self, loading, leave):
         self.loading = loading
         self.leave = leave
-        self.last_files = {}  # by extractor
-        self.told_of = set()  # extractors that replace an earlier run's files
-        self.missed = {}  # by extractor
 
     def prepare(self, module):
-        due = due_extractors()
-        self.tell_of_missed_steps(due)
-        due = self.leave_out_same_files(due)
+        due = self.leave_out_same_files(due_extractors())
         if due:
             make_folder(self.loading.folders.get(module.__name__, ""))
-            self.tell_of_older_files(due)
         drawn = [extractor for extractor in due if draws(extractor)]
         if self.leave(not all([has_display(extractor) for extractor in drawn])):
             leave_out(drawn)
-
-    def tell_of_missed_steps(self, due):
-        """Reports, once for each extractor, that the simulation hands over none of the step numbers that its trigger takes.
-        As many consecutive steps as the trigger's frequency would include one."""
-        from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
-        step = helper.GetTimeStep()
-        taking = {extractor.SMProxy.GetGlobalID() for extractor in due}
-        for extractor in enabled_extractors():
-            trigger, key = extractor.Trigger, extractor.SMProxy.GetGlobalID()
-            missed = self.missed.setdefault(key, Missed())
-            if key in taking or not counts_steps(trigger):
-                missed.is_over = True
-            if missed.is_over or step == missed.last or not is_between(trigger, step):
-                continue
-            missed.last = step
-            missed.count += 1
-            if missed.count == trigger.Frequency:
-                missed.is_over = True
-                log_warning("the extractor of '%s' has written nothing in %d steps: its trigger's frequency counts step "
-                            "numbers, and the simulation handed over none of %s" %
-                            (extractor.Writer.FileName, missed.count, steps_of(trigger)))
 
     def leave_out_same_files(self, due):
         """Returns the extractors without those that would replace another one's file in this step; reports and disables
@@ -303,21 +263,6 @@ class Extracts:
                           (len(same), name))
                 leave_out(same[1:])
         return [extractor for same in writers.values() for extractor in same[:1]]
-
-    def tell_of_older_files(self, due):
-        """Reports, once for each extractor, that it replaces files of an earlier run."""
-        from paraview.modules.vtkPVInSitu import vtkInSituInitializationHelper as helper
-        for extractor in due:
-            key, name = extractor.SMProxy.GetGlobalID(), extractor.Writer.FileName
-            try:
-                name = name.format(timestep=helper.GetTimeStep(), time=helper.GetTime())
-            except (IndexError, KeyError, ValueError):
-                continue  # it has fields that only its writer knows
-            file = os.path.join(self.loading.folder_of(extractor), name)
-            if key not in self.told_of and self.last_files.get(key) != file and os.path.isfile(file):
-                self.told_of.add(key)
-                log_warning("'%s' is an earlier run's file; this run replaces it and the others of its kind" % file)
-            self.last_files[key] = file
 
 
 def has_display(extractor):
@@ -414,19 +359,6 @@ def enabled_extractors():
 
 def counts_steps(trigger):
     return trigger is not None and trigger.GetXMLName() == "TimeStep"
-
-
-def is_between(trigger, step):
-    """Whether a step isn't before the trigger's first one or after its last one."""
-    is_early = trigger.UseStartTimeStep and step < trigger.StartTimeStep
-    is_late = trigger.UseEndTimeStep and step > trigger.EndTimeStep
-    return not is_early and not is_late
-
-
-def steps_of(trigger):
-    """The first step numbers that a trigger takes, as text."""
-    first = trigger.StartTimeStep if trigger.UseStartTimeStep else 0
-    return ", ".join(str(first + i * trigger.Frequency) for i in range(3)) + ", ..."
 
 
 def draws(extractor):

@@ -3,7 +3,6 @@
  * text. Environment: VDI_TEST_INITIALIZE=CODE: initialize returns that, and nothing else happens, unless
  * VDI_TEST_THEN=SCRIPT: initialize with that script succeeds and is finalized.
  * VDI_TEST_WANTS=1010: the answers of vdi_catalyst_wants before the steps.
- * VDI_TEST_APART=2: the steps are 1, 3, 5, ... instead of 1, 2, 3, ...
  * VDI_TEST_LATE=1: finalize is called after MPI_Finalize.
  * VDI_TEST_GROWTH=KIB: the resident memory grows by less from a quarter of the steps to the last.
  * VDI_ISOLATION: the same in processes of their own. */
@@ -97,12 +96,11 @@ static int run_steps(int rank, vdi_catalyst* catalyst, int argc, char** argv) {
   int total = 0;
   for (int i = 2; i < argc; ++i) total += strchr(argv[i], '*') != NULL ? atoi(strchr(argv[i], '*') + 1) : 1;
   const char* wanted = getenv("VDI_TEST_WANTS");
-  const char* apart = getenv("VDI_TEST_APART");
   int count = 0;
   long before = 0;
   for (int i = 2; i < argc; ++i) {
     for (int left = strchr(argv[i], '*') != NULL ? atoi(strchr(argv[i], '*') + 1) : 1; left > 0; --left) {
-      const int step = 1 + count++ * (apart != NULL ? atoi(apart) : 1);
+      const int step = ++count;
       simulate(rank, step);
       if (wanted != NULL && wanted[count - 1] != '\0')
         wrong += expect(rank, "wants", wanted[count - 1] - '0',
