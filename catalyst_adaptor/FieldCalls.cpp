@@ -105,8 +105,8 @@ int setParticles(FieldCalls& self, const char* name, const vdi_catalyst_particle
   });
   if (code == VDI_CATALYST_OK) {
     code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
-      requireEqual(self.comm, identityOf(name, array.kind),
-                   "the ranks give particles of different names or kinds");
+      requireEqual(self.comm, identityOf(name, array),
+                   "the ranks give particles of different names, kinds or periodic axes");
     });
   }
   if (code == VDI_CATALYST_OK) self.fields.set(std::move(change));

@@ -1,5 +1,6 @@
 #include "catalyst_adaptor/ParticleArray.h"
 
+#include <array>
 #include <cstddef>
 #include <functional>
 #include <limits>
@@ -44,6 +45,7 @@ ParticleArray particleArrayOf(const vdi_catalyst_particles* given) {
   ParticleArray array;
   array.kind = given->kind == VDI_CATALYST_DENSITY ? DepositKind::Density : DepositKind::Sum;
   array.particles.count = static_cast<std::size_t>(given->count);
+  for (std::size_t axis = 0; axis < 3; ++axis) array.particles.periodic[axis] = given->periodic[axis] != 0;
   if (given->count == 0) return array;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     require(given->positions[axis] != nullptr, "particles without positions");
@@ -59,9 +61,11 @@ ParticleArray particleArrayOf(const vdi_catalyst_particles* given) {
   return array;
 }
 
-std::int64_t identityOf(const char* name, DepositKind kind) {
-  const std::size_t hash = std::hash<std::string_view>()(name);
-  return static_cast<std::int64_t>(hash ^ (kind == DepositKind::Density ? 1U : 0U));
+std::int64_t identityOf(const char* name, const ParticleArray& array) {
+  const std::array<bool, 3>& periodic = array.particles.periodic;
+  const std::size_t flags = (array.kind == DepositKind::Density ? 1U : 0U) | (periodic[0] ? 2U : 0U) |
+                            (periodic[1] ? 4U : 0U) | (periodic[2] ? 8U : 0U);
+  return static_cast<std::int64_t>(std::hash<std::string_view>()(name) ^ flags);
 }
 
 }  // namespace vdi::catalyst

@@ -22,7 +22,7 @@ using DepositedValues = std::vector<std::shared_ptr<float[]>>;
 /// Throws std::invalid_argument with the reason if they are invalid.
 ParticleArray particleArrayOf(const vdi_catalyst_particles* given);
 
-/// A number for requireEqual: equal on two ranks if name and kind are.
-std::int64_t identityOf(const char* name, DepositKind kind);
+/// A number for requireEqual: equal on two ranks if name, kind and periodic axes are.
+std::int64_t identityOf(const char* name, const ParticleArray& array);
 
 }  // namespace vdi::catalyst

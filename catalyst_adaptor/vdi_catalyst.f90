@@ -66,6 +66,7 @@ module vdi_catalyst
     integer(c_int64_t) :: length_stride = 8
     integer(c_int32_t) :: weight_type = vdi_catalyst_f64
     integer(c_int32_t) :: length_type = vdi_catalyst_f64
+    integer(c_int32_t) :: periodic(3) = 0
   end type
 
   interface

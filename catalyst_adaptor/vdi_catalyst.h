@@ -257,6 +257,7 @@ typedef struct vdi_catalyst_particles {
   int64_t length_stride;
   int32_t weight_type;
   int32_t length_type;
+  int32_t periodic[3]; /* per axis: not 0 if the blocks of all ranks are one period of it; the same on all */
 } vdi_catalyst_particles;
 
 /* Makes an array of cells from particles, of type VDI_CATALYST_F32. Scripts, runs without one and their
@@ -280,6 +281,10 @@ typedef struct vdi_catalyst_particles {
  * this side. Ghost cells get the values of their owners. Cells that finer blocks hide get the mean
  * of the cells that hide them. The result is the same for any distribution of blocks and particles
  * over ranks, to within rounding to f32.
+ *
+ * Along a periodic axis, positions are wrapped into the period, which is the extent of all ranks' blocks
+ * without ghost layers, and weight that would lie beyond a face enters at the opposite one. Ghost cells there
+ * get the values of the cells that they repeat.
  *
  * Particles outside all blocks (blocks own their lower faces, not their upper ones), and those whose position
  * or weight isn't finite, are left out. Those whose h is NaN, infinite, 0 or negative are deposited by cloud

@@ -1,6 +1,7 @@
 // Particles and blocks of cells for tests of deposits.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <random>
 #include <vector>
@@ -15,10 +16,12 @@ struct ParticleSet {
   std::vector<glm::dvec3> positions;
   std::vector<double> weights;
   std::vector<double> lengths;  // empty: cloud in cell
+  std::array<bool, 3> periodic{};
 
   Particles particles() const {
     Particles all;
     all.count = positions.size();
+    all.periodic = periodic;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto* const first = reinterpret_cast<const std::byte*>(positions.data());
       all.positions[axis] = {first + axis * sizeof(double), sizeof(glm::dvec3), true};

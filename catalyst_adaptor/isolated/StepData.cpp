@@ -85,6 +85,7 @@ class Placement {
     for (int axis = 0; axis < 3; ++axis) head_.put(offset[axis]);
     head_.putAll(missing);
     head_.put(array.kind);
+    head_.put(array.particles.periodic);
     head_.put(std::uint64_t{array.particles.count});
     for (const NumberColumn& column : columnsOf(array.particles)) {
       head_.put(column.isDouble);
@@ -136,6 +137,8 @@ class StepReader {
     for (double& offset : particles.offset) offset = take<double>();
     particles.missing = head_.takeAll<double>();
     given.kind = take<DepositKind>() == DepositKind::Density ? VDI_CATALYST_DENSITY : VDI_CATALYST_SUM;
+    const auto periodic = take<std::array<bool, 3>>();
+    for (std::size_t axis = 0; axis < 3; ++axis) given.periodic[axis] = periodic[axis] ? 1 : 0;
     given.count = static_cast<std::int64_t>(take<std::uint64_t>());
     if (given.count < 0) throw std::runtime_error("a step has too many particles to count");
     const auto column = [&](const void*& first, std::int32_t& type, std::int64_t& stride) {

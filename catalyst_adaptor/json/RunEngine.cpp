@@ -474,11 +474,16 @@ void RunEngine::tryTwice(Work work) {
 
 void RunEngine::makeOne(Fields& fields, std::int64_t step, double time, const config::RunCamera& camera,
                         bool isForFiles, runlog::FrameRecord& record) {
-  tryTwice([&] {
-    state_->comm.together([&] { record = recordOf(step, time, camera); });
-    if (!state_->frame) prepare(fields, step, time);
-    deliver(camera, isForFiles, record);
-  });
+  try {
+    tryTwice([&] {
+      state_->comm.together([&] { record = recordOf(step, time, camera); });
+      if (!state_->frame) prepare(fields, step, time);
+      deliver(camera, isForFiles, record);
+    });
+  } catch (const Error& error) {  // thrown on all ranks
+    if (error.code() != ErrorCode::OutOfMemory || !run_.maxDeviceMiB) throw;
+    throw Error(error.code(), fmt::format("{}; \"max_device_mib\" is {}", error.what(), *run_.maxDeviceMiB));
+  }
 }
 
 /// Gives the device the step's values.

@@ -53,7 +53,7 @@ StepFields stepOf(const Fields& fields) {
   StepFields step;
   step.arrays = fields.arrays();
   for (const auto& [name, particles] : fields.particles())
-    step.particles.push_back({name, particles, fields.offsetOf(name, true)});
+    step.particles.push_back({name, particles, fields.offsetOf(name, true), fields.missingOf(name, true)});
   return step;
 }
 
@@ -77,6 +77,7 @@ TEST_CASE("fields arrive: strides, offsets, blocks that lack an array, particles
   const StridedValues missing = fields.inOrder(fields.blocks()[1], VDI_CATALYST_F64, true, 1, nullptr);
   fields.set(Fields::arrayChange("E", true, VDI_CATALYST_F64, {values, missing}));
   fields.set(Fields::offsetChange("E", true, {-0.5, 0.0, 0.25}));
+  fields.set(Fields::missingChange("E", true, {-9999.0, 1e20}));
 
   // Positions from the last to the first, one weight for all, no lengths.
   const std::array<float, 6> positions{1, 2, 3, 4, 5, 6};
@@ -89,6 +90,8 @@ TEST_CASE("fields arrive: strides, offsets, blocks that lack an array, particles
   given.position_stride = -12;
   given.weights = &weight;
   given.weight_type = VDI_CATALYST_F64;
+  given.periodic[1] = 1;
+  fields.set(Fields::missingChange("stars", true, {0.0}));
   fields.set(Fields::offsetChange("stars", true, {0.25, 0.0, -0.5}));
   fields.set(Fields::particlesChange("stars", particleArrayOf(&given)));
 
@@ -103,6 +106,7 @@ TEST_CASE("fields arrive: strides, offsets, blocks that lack an array, particles
   const StepData::Array& array = got.arrays[0];
   CHECK((array.name == "E" && array.cells && array.type == VDI_CATALYST_F64 && array.components == 1));
   CHECK((array.offset[0] == -0.5 && array.offset[1] == 0.0 && array.offset[2] == 0.25));
+  CHECK(array.missing == std::vector{-9999.0, 1e20});
   REQUIRE(array.blocks.size() == 2);
   CHECK(array.blocks[1] == nullptr);
   for (std::size_t x = 0; x < 2; ++x) {
@@ -118,6 +122,7 @@ TEST_CASE("fields arrive: strides, offsets, blocks that lack an array, particles
   const vdi_catalyst_particles& stars = got.particles[0].given;
   const auto& offset = got.particles[0].offset;
   CHECK((offset[0] == 0.25 && offset[1] == 0.0 && offset[2] == -0.5));
+  CHECK((stars.periodic[0] == 0 && stars.periodic[1] == 1 && got.particles[0].missing == std::vector{0.0}));
   CHECK((got.particles[0].name == "stars" && stars.count == 2 && stars.kind == VDI_CATALYST_DENSITY));
   CHECK((stars.position_type == VDI_CATALYST_F32 && stars.position_stride == sizeof(float)));
   for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -244,6 +244,9 @@ TEST_CASE("mistakes are told with their place") {
   refusedField(R"("max_share": 1.5)", "/max_share: is a share, 1 at most");
   refusedField(R"("max_share": 0)", "/max_share: must be > 0");
   refusedField(R"("max_device_mib": 0)", "/max_device_mib");
+  refusedField(R"("max_device_mib": 31)", "/max_device_mib");
+  refusedField(R"("missing": -9999)", "/missing");
+  refusedField(R"("missing": [1, "x"])", "/missing/1");
   refusedField(R"("max_host_mib": 0)", "/max_host_mib");
   refusedField(R"("existing": "append")", "/existing: must be 'refuse', 'overwrite' or 'continue'");
   refusedField(R"("existing": true)", "/existing: must be a string");

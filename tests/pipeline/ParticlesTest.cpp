@@ -127,6 +127,47 @@ TEST_CASE("particles and blocks dealt to ranks at random make the reference's de
   CHECK(device()->validationMessages() == "");
 }
 
+TEST_CASE("periodic axes wrap positions and weight, on ranks as in the reference") {
+  const comm::Communicator world = comm::Communicator::world();
+  for (const Scene& scene : scenes()) {
+    for (const double longest : {0.0, 0.12, 0.6}) {
+      INFO(scene.name << ", longest kernel " << longest);
+      ParticleSet all =
+          randomParticles(longest > 0.3 ? 20 : 150, {glm::dvec3(-0.7), glm::dvec3(1.6)}, longest, 3);
+      all.periodic = {true, true, true};
+      all.positions[0] = glm::dvec3(0.0);
+      all.positions[1] = glm::dvec3(1.0, -1e-17, 0.5);
+      Shared shared(scene.blocks, all, world, 7);
+      shared.mySet.periodic = all.periodic;
+      const reference::Deposit expected =
+          reference::deposit(scene.blocks, all.particles(), DepositKind::Density);
+      const DepositedArray made = depositOn(world, shared.myBlocks(), shared.mySet, DepositKind::Density);
+      CHECK(made.counts.outside == 0);
+      CHECK(reference::totalOf(scene.blocks, expected.values, DepositKind::Density) ==
+            Approx(all.total()).epsilon(1e-6));
+      for (std::size_t i = 0; i < shared.mine.size(); ++i) {
+        CHECK(differenceOf(made.values[i].get(), expected.values[shared.mine[i]],
+                           largestOf(expected.values)) < 1e-3);
+      }
+    }
+  }
+  // What particles make is the same wherever in the period they are.
+  const std::vector<Block> block{cellsIn(cube, glm::dvec3(0.1, 0.05, 0.2))};
+  for (const double longest : {0.0, 0.4}) {
+    ParticleSet set = randomParticles(40, cube, longest, 4);
+    set.periodic = {true, false, false};
+    const reference::Deposit before = reference::deposit(block, set.particles(), DepositKind::Sum);
+    for (glm::dvec3& position : set.positions) position.x += 0.3 - 2.0;
+    const reference::Deposit after = reference::deposit(block, set.particles(), DepositKind::Sum);
+    double worst = 0.0;
+    for (std::size_t i = 0; i < before.values[0].size(); ++i) {
+      const std::size_t moved = i - i % 10 + (i % 10 + 3) % 10;
+      worst = std::max(worst, std::abs(before.values[0][i] - after.values[0][moved]));
+    }
+    CHECK(worst < 1e-9);
+  }
+}
+
 TEST_CASE("no weight is lost between ranks") {
   const comm::Communicator world = comm::Communicator::world();
   for (const Scene& scene : scenes()) {

@@ -267,6 +267,32 @@ def check_missing():
     assert (shown(masked, change=change).segments == expected).all()
 
 
+def periodic(places):
+    with Catalyst(MPI.COMM_WORLD, json={"field": "p", "resolution": [48, 32], "output": "periodic_{timestep}.vdi",
+                                        "existing": "overwrite"}) as catalyst:
+        catalyst.set_blocks([Block(cells=(N, N, N), spacing=(1 / N,) * 3)])
+        catalyst.set_particles("p", places, periodic=(True, False, True))
+        catalyst.execute(0)
+    return pv_vdi.read("periodic_0.vdi").segments
+
+
+def check_faces():
+    """Arrays of all faces across an axis: what cells' lower faces show, and, but for the last half cell, points' means."""
+    def made(shape, offset):
+        with Catalyst(MPI.COMM_WORLD, json={"field": "V", "resolution": [48, 32], "output": "faces_{timestep}.vdi",
+                                            "existing": "overwrite", "colors": {"range": [0, 3]}}) as catalyst:
+            catalyst.set_blocks([Block(cells=(N, N, N), spacing=(1 / N,) * 3)])
+            z, y, x = np.meshgrid(*map(np.arange, shape), indexing="ij")
+            catalyst.set_array("V", [(z + 2 * y + 3 * x) / (2 * N)], offset=offset)
+            catalyst.execute(0)
+        return pv_vdi.read("faces_0.vdi").segments
+
+    for axis in (0, 2):
+        shape, offset = [N, N, N], [0, 0, 0]
+        shape[2 - axis], offset[axis] = N + 1, -0.5
+        assert (made(shape, None) == made([N, N, N], offset)).all(), axis
+
+
 refused(SCRIPT, "no such field", json={"field": "V", "evry": 10})
 refused(SCRIPT, "none.json", json="none.json")
 run = {"field": "V", "every": 10, "resolution": [48, 32], "stream": {"link_file": "link"},
@@ -308,6 +334,7 @@ check_levels()
 check_lost()
 check_threads()
 check_missing()
+check_faces()
 
 # Particles: one array or three, of any stride, weights and lengths for each or for all.
 places = np.random.default_rng(3).uniform(0.2, 0.8, (2000, 3))
@@ -317,5 +344,8 @@ wide = np.zeros((2000, 8), np.float64)
 wide[:, 1:4] = places
 for other in (shown(wide[:, 1:4], 0.5, 0.1, True), shown(tuple(np.asfortranarray(places).T), 0.5, np.full(2000, 0.1), True)):
     assert (other.segments == expected.segments).all()
+# Along periodic axes, particles of another period are those of this one.
+exact = np.round(places * 2 ** 20) / 2 ** 20
+assert (periodic(exact) == periodic(exact + [1, 0, -2])).all()
 summed = shown(places, 0.5 * N ** 3, 0.1, False).metadata["array"]
 assert summed["name"] == "particles" and summed == expected.metadata["array"], (summed, expected.metadata["array"])

@@ -270,8 +270,13 @@ void readTriggers(const JsonValue& document, Run& run) {
     if (*run.maxShare > 1.0) value.fail("is a share, 1 at most");
   });
   constexpr std::int64_t mostMebibytes = std::int64_t{1} << 24;  // 16 TiB
-  ifThere(document, "max_device_mib",
-          [&](const JsonValue& value) { run.maxDeviceMiB = value.whole(1, mostMebibytes); });
+  constexpr std::int64_t staging = 32;  // the buffer through which values travel, in MiB
+  ifThere(document, "max_device_mib", [&](const JsonValue& value) {
+    run.maxDeviceMiB = value.whole(1, mostMebibytes);
+    if (*run.maxDeviceMiB < staging)
+      value.fail(
+          fmt::format("must be at least {}, beside the volume: values are staged in that many MiB", staging));
+  });
   ifThere(document, "max_host_mib",
           [&](const JsonValue& value) { run.maxHostMiB = value.whole(1, mostMebibytes); });
 }

@@ -9,11 +9,15 @@
 //   Astrophys. 30, 543), taken at the centres of cells. Cells larger than the owner's are first divided into
 //   equal parts of about the size of the owner's cells, and get the mean of the parts.
 //
+// Along a periodic axis, the blocks of all ranks are one period. Positions are wrapped into it, and the
+// weight that leaves it at one side enters at the other.
+//
 // A particle's shares are divided by their sum over all owned cells of all blocks, so none of its weight is
 // lost at the domain's faces, between levels, or by coarse sampling of the kernel.
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -47,7 +51,17 @@ struct Particles {
   std::array<NumberColumn, 3> positions;  // x, y, z in the world
   NumberColumn weights;                   // null: 1 each
   NumberColumn lengths;                   // smoothing lengths h in the world; null: cloud in cell for all
+  std::array<bool, 3> periodic{};         // per axis; equal on all ranks
 };
+
+/// A coordinate within the period [lo, hi) that it repeats in.
+inline double wrapped(double at, double lo, double hi) {
+  const double periods = (at - lo) / (hi - lo);
+  const double within = lo + (periods - std::floor(periods)) * (hi - lo);
+  return at >= lo && at < hi ? at : within < hi ? within : lo;
+}
+/// The most periods by which a particle's spread is repeated to each side. Longer kernels are flat.
+constexpr int mostPeriods = 4;
 
 /// The value of a cell: the weight in it, or this weight divided by the cell's volume.
 enum class DepositKind { Sum, Density };

@@ -96,16 +96,16 @@ ParticleRouting::ParticleRouting(const comm::Communicator& comm, const std::vect
                                  int mostCells)
     : directory_(comm, mine, false), mostCells_(mostCells) {
   comm.together([&] {
-    Box all;
     for (const comm::BlockEntry& entry : directory_.entries()) {
       places_.push_back(
           {entry.origin - 0.5 * entry.spacing, entry.spacing, entry.dims, entry.rank, entry.block});
       PlacedBlock& place = places_.back();
       place.stored = {place.lower, place.lower + glm::dvec3(place.cells) * place.spacing};
-      all.include(entry.owned);
+      domain_.include(entry.owned);
+      stored_.include(place.stored);
     }
     constexpr double flat = 1e6;
-    longest_ = flat * glm::length(all.size());
+    longest_ = flat * glm::length(domain_.size());
   });
   findOwned(comm);
   comm.together([&] {
@@ -174,7 +174,7 @@ void ParticleRouting::findMet(const Spread& spread, std::vector<const PlacedBloc
       if (glm::all(glm::greaterThan(common.hi - common.lo, slack))) met.push_back(&places_[i]);
     }
   };
-  if (spread.h > 0.0) {
+  if (spread.h > 0.0 || spread.isImage) {
     find(directory_.meeting(box));
   } else {
     find(owner.near);
@@ -188,7 +188,12 @@ std::size_t ParticleRouting::route(const Particles& particles, std::size_t first
   std::size_t i = first;
   for (; i < last && routed.size() < enough; ++i) {
     const std::optional<Spread> spread = spreadOf(particles, i, counts);
-    if (spread) send(*spread, exponent, met, routed);
+    if (!spread) continue;
+    if (particles.periodic == std::array<bool, 3>{}) {
+      send(*spread, exponent, met, routed);
+    } else {
+      sendImages(*spread, particles.periodic, exponent, met, routed);
+    }
   }
   return i;
 }
@@ -203,10 +208,14 @@ std::optional<ParticleRouting::Spread> ParticleRouting::spreadOf(const Particles
       {particles.positions[0].at(index), particles.positions[1].at(index), particles.positions[2].at(index)},
       particles.weights ? particles.weights.at(index) : 1.0,
       0.0};
-  const glm::dvec3& p = spread.position;
+  glm::dvec3& p = spread.position;
   if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z) || !std::isfinite(spread.weight)) {
     ++counts.notFinite;
     return std::nullopt;
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    if (particles.periodic[static_cast<std::size_t>(axis)] && domain_.lo[axis] < domain_.hi[axis])
+      p[axis] = wrapped(p[axis], domain_.lo[axis], domain_.hi[axis]);
   }
   const std::optional<std::size_t> found = ownedTree_->containing(p);
   if (!found) {
@@ -323,6 +332,63 @@ void ParticleRouting::send(Spread spread, int exponent, std::vector<const Placed
     isSummed = !isWithinOneLattice(spread, met);
     sum = isSummed ? sumOf(spread, met) : 1.0;
   }
+  sendShares(spread, met, sum, isSummed, exponent, routed);
+}
+
+/// The spread, and its repetitions along periodic axes that may meet stored cells.
+std::vector<ParticleRouting::Spread> ParticleRouting::imagesOf(const Spread& spread,
+                                                               const std::array<bool, 3>& periodic) const {
+  std::vector<Spread> images{spread};
+  // Cells that the spread meets reach up to a cell beyond it.
+  const Box bounds{spread.bounds().lo - spread.owner->spacing, spread.bounds().hi + spread.owner->spacing};
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!periodic[static_cast<std::size_t>(axis)]) continue;
+    const double period = domain_.size()[axis];
+    const std::size_t count = images.size();
+    for (int shift = -mostPeriods; shift <= mostPeriods; ++shift) {
+      const double by = shift * period;
+      if (shift == 0 || bounds.hi[axis] + by < stored_.lo[axis] || bounds.lo[axis] + by > stored_.hi[axis])
+        continue;
+      for (std::size_t i = 0; i < count; ++i) {
+        Spread image = images[i];
+        image.position[axis] += by;
+        image.isImage = true;
+        images.push_back(image);
+      }
+    }
+  }
+  return images;
+}
+
+/// Sends a particle of periodic axes. Its shares add up to its weight over all repetitions.
+void ParticleRouting::sendImages(Spread spread, const std::array<bool, 3>& periodic, int exponent,
+                                 std::vector<const PlacedBlock*>& met,
+                                 std::vector<RoutedParticle>& routed) const {
+  std::vector<Spread> images = imagesOf(spread, periodic);
+  if (images.size() == 1) return send(spread, exponent, met, routed);
+  const auto sumOfAll = [&] {
+    double sum = 0.0;
+    for (const Spread& image : images) {
+      findMet(image, met);
+      sum += sumOf(image, met);
+    }
+    return sum;
+  };
+  double sum = sumOfAll();
+  if (sum < leastKernelSum * peakOf(spread)) {
+    spread.h = 0.0;
+    images = imagesOf(spread, periodic);
+    sum = sumOfAll();
+  }
+  for (const Spread& image : images) {
+    findMet(image, met);
+    sendShares(image, met, sum, true, exponent, routed);
+  }
+}
+
+/// Sends the particle to all blocks that it meets.
+void ParticleRouting::sendShares(const Spread& spread, std::span<const PlacedBlock* const> met, double sum,
+                                 bool isSummed, int exponent, std::vector<RoutedParticle>& routed) const {
   for (const PlacedBlock* to : met) {
     const PlacedBlock& place = *to;
     const Cells cells(spread, place);

@@ -1,6 +1,7 @@
 // Finds the blocks on which each particle is deposited. Not part of the library's interface.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -54,7 +55,8 @@ class ParticleRouting {
     const PlacedBlock* owner;
     glm::dvec3 position;
     double weight;
-    double h;  // 0: cloud in cell
+    double h;              // 0: cloud in cell
+    bool isImage = false;  // repeated at another place than the owner's
 
     Box bounds() const {
       const glm::dvec3 reach = h > 0.0 ? glm::dvec3(2.0 * h) : 0.5 * owner->spacing;
@@ -72,6 +74,11 @@ class ParticleRouting {
   bool isWithinOneLattice(const Spread& spread, std::span<const PlacedBlock* const> met) const;
   double sumOf(const Spread& spread, std::span<const PlacedBlock* const> met) const;
   static double peakOf(const Spread& spread);
+  std::vector<Spread> imagesOf(const Spread& spread, const std::array<bool, 3>& periodic) const;
+  void sendShares(const Spread& spread, std::span<const PlacedBlock* const> met, double sum, bool isSummed,
+                  int exponent, std::vector<RoutedParticle>& routed) const;
+  void sendImages(Spread spread, const std::array<bool, 3>& periodic, int exponent,
+                  std::vector<const PlacedBlock*>& met, std::vector<RoutedParticle>& routed) const;
   void send(Spread spread, int exponent, std::vector<const PlacedBlock*>& met,
             std::vector<RoutedParticle>& routed) const;
 
@@ -84,6 +91,8 @@ class ParticleRouting {
   std::vector<OwnedBox> owned_;
   std::unique_ptr<comm::BoxTree> ownedTree_;  // of owned_
   int mostCells_;
+  Box domain_;            // bounds of all owned boxes
+  Box stored_;            // bounds of all stored cells
   double longest_ = 0.0;  // beyond this h the kernel is flat over all blocks
 };
 

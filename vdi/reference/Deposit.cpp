@@ -119,6 +119,28 @@ double sumOf(const std::vector<Lattice>& lattices, const Spread& spread) {
   return sum;
 }
 
+/// The spread, and its repetitions along periodic axes.
+std::vector<Spread> imagesOf(const Spread& spread, const std::array<bool, 3>& periodic, const Box& domain) {
+  std::vector<Spread> images{spread};
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!periodic[static_cast<std::size_t>(axis)]) continue;
+    const std::vector<Spread> before = images;
+    for (int shift = -mostPeriods; shift <= mostPeriods; ++shift) {
+      for (Spread image : before) {
+        image.position[axis] += shift * domain.size()[axis];
+        if (shift != 0) images.push_back(image);
+      }
+    }
+  }
+  return images;
+}
+
+double sumOf(const std::vector<Lattice>& lattices, const std::vector<Spread>& images) {
+  double sum = 0.0;
+  for (const Spread& image : images) sum += sumOf(lattices, image);
+  return sum;
+}
+
 std::size_t indexOf(const Lattice& lattice, const glm::ivec3& cell) {
   return IndexBox{glm::ivec3(0), lattice.cells}.position(cell);
 }
@@ -129,15 +151,23 @@ Deposit deposit(std::span<const Block> blocks, const Particles& particles, Depos
   const std::vector<Lattice> lattices = latticesOf(blocks);
   Deposit result;
   for (const Block& block : blocks) result.values.emplace_back(block.valueCount(), 0.0);
+  Box domain;
+  for (const Lattice& lattice : lattices) {
+    for (const Box& box : lattice.owned) domain.include(box);
+  }
   ParticleCounts& counts = result.counts;
   counts.given = particles.count;
   for (std::size_t p = 0; p < particles.count; ++p) {
-    const glm::dvec3 position(particles.positions[0].at(p), particles.positions[1].at(p),
-                              particles.positions[2].at(p));
+    glm::dvec3 position(particles.positions[0].at(p), particles.positions[1].at(p),
+                        particles.positions[2].at(p));
     const double weight = particles.weights ? particles.weights.at(p) : 1.0;
     if (glm::any(glm::isnan(position)) || glm::any(glm::isinf(position)) || !std::isfinite(weight)) {
       ++counts.notFinite;
       continue;
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      if (particles.periodic[static_cast<std::size_t>(axis)])
+        position[axis] = wrapped(position[axis], domain.lo[axis], domain.hi[axis]);
     }
     const auto owner = std::find_if(lattices.begin(), lattices.end(), [&](const Lattice& lattice) {
       return std::any_of(lattice.owned.begin(), lattice.owned.end(),
@@ -155,16 +185,20 @@ Deposit deposit(std::span<const Block> blocks, const Particles& particles, Depos
       const double largest = std::max({owner->spacing.x, owner->spacing.y, owner->spacing.z});
       if (isGood && h >= shortestKernel * largest) spread.h = h;
     }
-    double sum = sumOf(lattices, spread);
+    std::vector<Spread> images = imagesOf(spread, particles.periodic, domain);
+    double sum = sumOf(lattices, images);
     if (spread.h > 0.0 && sum < leastKernelSum * cubicSpline(0.0, spread.h) * owner->volume()) {
       spread.h = 0.0;
-      sum = sumOf(lattices, spread);
+      images = imagesOf(spread, particles.periodic, domain);
+      sum = sumOf(lattices, images);
     }
-    forEachCell(lattices, spread, [&](std::size_t i, const glm::ivec3& cell) {
-      const double scale = kind == DepositKind::Sum ? lattices[i].volume() : 1.0;
-      result.values[i][indexOf(lattices[i], cell)] +=
-          weight / sum * spread.density(lattices[i], cell) * scale;
-    });
+    for (const Spread& image : images) {
+      forEachCell(lattices, image, [&](std::size_t i, const glm::ivec3& cell) {
+        const double scale = kind == DepositKind::Sum ? lattices[i].volume() : 1.0;
+        result.values[i][indexOf(lattices[i], cell)] +=
+            weight / sum * image.density(lattices[i], cell) * scale;
+      });
+    }
   }
   return result;
 }

@@ -258,6 +258,7 @@ class Worker {
       for (const StepData::Particles& particles : data.particles) {
         names.putText(particles.name);
         names.put(particles.given.kind);
+        names.put(particles.given.periodic);
       }
       return std::vector{comm::Communicator::Fingerprint{hashOf(names.bytes()), "the names of particles"}};
     });

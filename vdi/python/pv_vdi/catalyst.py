@@ -92,7 +92,7 @@ class _Particles(ctypes.Structure):
                 ("positions", ctypes.c_void_p * 3), ("position_stride", ctypes.c_int64),
                 ("weights", ctypes.c_void_p), ("weight_stride", ctypes.c_int64),
                 ("lengths", ctypes.c_void_p), ("length_stride", ctypes.c_int64),
-                ("weight_type", ctypes.c_int32), ("length_type", ctypes.c_int32)]
+                ("weight_type", ctypes.c_int32), ("length_type", ctypes.c_int32), ("periodic", ctypes.c_int32 * 3)]
 
 
 def _columns(positions):
@@ -128,12 +128,13 @@ def _float_type(what, dtype):
     return _TYPES[dtype]
 
 
-def _particles(positions, weights, lengths, density):
+def _particles(positions, weights, lengths, density, periodic):
     """The particles as the engine takes them, and the arrays that they point to. Raises ValueError."""
     columns = _columns(positions)
     count = len(columns[0])
     made = _Particles(count, _DENSITY if density else _SUM, _float_type("positions", columns[0].dtype),
                       (ctypes.c_void_p * 3)(*(column.ctypes.data for column in columns)), columns[0].strides[0])
+    made.periodic[:] = [int(bool(axis)) for axis in np.broadcast_to(periodic, 3)]
     kept = [columns]
     if weights is not None:
         array, made.weight_stride = _numbers("weights", weights, count)
@@ -264,6 +265,7 @@ class Catalyst:
         self._blocks = []
         self._kept = {}  # arrays that the engine points to, by association and name
         self._masked = {}  # those that are copies of masked arrays
+        self._offsets = {}  # of arrays of cells
         self._shared_error = None  # the last one, which all ranks have raised
         self._is_alone = communicator.Get_size() == 1
         self._run = _Run(self._library, kind, communicator)
@@ -290,12 +292,14 @@ class Catalyst:
         self._blocks = blocks
         self._kept = {}
         self._masked = {}
+        self._offsets = {}
 
     def set_array(self, name, arrays, points=False, offset=None, missing=None):
         """The values of one named array: arrays[i] belongs to block i, and is None if the block lacks it. It is [z][y][x], or
         [z][y][x][component] for vectors, of which a run shows the magnitude unless told otherwise. Complex numbers are vectors
         of two. Values are of cells, or of points, of which a block has one more per axis. On staggered grids the values lie
-        `offset` cells (x, y, z; -0.5 to 0.5) beside these.
+        `offset` cells (x, y, z; -0.5 to 0.5) beside these. An array of cells that has one value more along one axis is one of
+        the faces across that axis, as on C-grids.
 
         Missing values are transparent, and count in no range of colours: NaN, values that equal one of the numbers `missing`,
         such as a file's fill value, and those that a masked array masks. execute() copies masked arrays each time, integers as
@@ -311,6 +315,10 @@ class Catalyst:
             arrays = _faults.one_per_block(name, arrays, len(self._blocks))
             masked = [_Masked(array) if isinstance(array, np.ma.MaskedArray) else None for array in arrays]
             arrays = [array if copy is None else copy.values for array, copy in zip(arrays, masked)]
+            if offset is None and not points:
+                # A rank whose blocks lack the array can't tell, but takes part in the call.
+                arrays, offset = self._faces(arrays)
+                offset = offset or self._offsets.get(name, (0, 0, 0))
             number, components, pointers, strides = self._given(name, arrays, points)
             numbers = [] if missing is None else [float(number) for number in np.ravel(missing)]
             offsets = None if offset is None else (ctypes.c_double * 3)(
@@ -324,6 +332,23 @@ class Catalyst:
                 self._handle, key, association, len(numbers), (ctypes.c_double * max(len(numbers), 1))(*numbers)))
         if offsets is not None:
             self._check(self._library.vdi_catalyst_set_array_offset(self._handle, key, association, offsets))
+            if not points:
+                self._offsets[name] = offset
+
+    def _faces(self, arrays):
+        """The arrays and their offset: those of faces as cells' lower faces, of which the last layer has none. A block without
+        a neighbour there continues its values over the last half of a cell."""
+        axes = set()
+        for array, block in zip(arrays, self._blocks):
+            if array is not None and getattr(array, "ndim", 0) >= 3:
+                more = np.subtract(array.shape[2::-1], block.cells)
+                axes.add(int(np.argmax(more)) if sorted(more) == [0, 0, 1] else None)
+        if len(axes) != 1 or None in axes:
+            return arrays, None
+        axis = axes.pop()
+        lower = tuple(slice(None, -1 if place == axis else None) for place in (2, 1, 0))
+        offset = [-0.5 if place == axis else 0 for place in range(3)]
+        return [None if array is None else array[lower] for array in arrays], offset
 
     def _given(self, name, arrays, points):
         """The type, the number of components, the pointers and the strides of one array for each block. Raises ValueError."""
@@ -348,10 +373,11 @@ class Catalyst:
               for view in views))
         return _TYPES[present[0].dtype if present else np.dtype("float64")], components.pop(), pointers, strides
 
-    def set_particles(self, name, positions, weights=None, lengths=None, density=False):
+    def set_particles(self, name, positions, weights=None, lengths=None, density=False, periodic=False):
         """Makes a cell array of this rank's particles, which may lie in blocks of any rank: the particles' weight in each
         cell, with `density` divided by the cell's volume. `positions` is [particle][3], or three arrays x, y and z. `weights`
         (1 unless given) and smoothing lengths `lengths` (cloud in cell unless given) are an array each, or a number for all.
+        `periodic`, a flag or one for each axis, wraps positions and weight around the extent of all ranks' blocks.
         vdi_catalyst.h has the rules.
 
         Arrays are kept alive and used in place: change them in place between steps, or set others when their number
@@ -359,7 +385,7 @@ class Catalyst:
         a fault raise CatalystError then."""
         with self._or_refused():
             key = _faults.name_bytes(name)
-            made, kept = _particles(positions, weights, lengths, density)
+            made, kept = _particles(positions, weights, lengths, density, periodic)
         self._check(self._library.vdi_catalyst_set_particles(self._handle, key, made))
         self._masked.pop((_CELLS, name), None)
         self._kept[_CELLS, name] = kept  # an array of cells, as far as the engine is concerned
