@@ -499,7 +499,8 @@ def test_screenshots(browser):
     browser.value(f"vdiPage.setCamera({json.dumps(camera)}, false)")
     final(browser)
     size = (3 * WIDTH, 3 * HEIGHT)
-    compare("a large screenshot", png_of(browser, f"[{size[0]}, {size[1]}]")[..., :3], rendered("compact.vdi", camera, size=size))
+    large = png_of(browser, f"[{size[0]}, {size[1]}]")[..., :3]
+    compare("a large screenshot", large, rendered("compact.vdi", camera, size=size))
     compare("the view after it", shown(browser), rendered("compact.vdi", camera))
     flat = png_of(browser, f"[{size[0]}, {size[1]}], true")
     check(flat.shape[2] == 4 and flat[0, 0, 3] == 0 and flat[..., 3].max() > 100, f"a transparent background: {flat.shape}")

@@ -220,7 +220,8 @@ class ServeTest(ServedFolder):
         self.assertEqual(server.get("/status?x", Authorization="Bearer " + server.token)[0].status, 200)
         # What a page asks when its WebSocket didn't open.
         own = f"http://127.0.0.1:{server.port}"
-        for target, status in (("/stream", 426), (f"/stream?origin={own}", 426), ("/stream?origin=https%3A%2F%2Fa.example", 403)):
+        for target, status in (("/stream", 426), (f"/stream?origin={own}", 426),
+                               ("/stream?origin=https%3A%2F%2Fa.example", 403)):
             self.assertEqual(server.get(target)[0].status, status, target)
         self.assertIn("frame-ancestors 'none'", policy)
         desk = self.serve(self.live, "--embed-in", "https://desk.example", "--embed-in", "http://b.example:81")
