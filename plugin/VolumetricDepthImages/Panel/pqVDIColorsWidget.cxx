@@ -12,15 +12,20 @@
 #include <vtkSMProxy.h>
 #include <vtkSMSessionProxyManager.h>
 #include <vtkSMTrace.h>
+#include <QAbstractButton>
+#include <QApplication>
 #include <QCheckBox>
+#include <QEvent>
 #include <QLabel>
 #include <QPushButton>
 #include <QScreen>
+#include <QTimer>
 #include <QVBoxLayout>
 #include <QWindow>
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 namespace {
 
@@ -80,10 +85,12 @@ pqVDIColorsWidget::pqVDIColorsWidget(vtkSMProxy* proxy, vtkSMProperty*, QWidget*
   this->connect(&active, QOverload<pqRepresentation*>::of(&pqActiveObjects::representationChanged), this,
                 &pqVDIColorsWidget::closeWhereNothingIsShown);
   this->connect(&active, &pqActiveObjects::viewChanged, this, &pqVDIColorsWidget::closeWhereNothingIsShown);
+  QApplication::instance()->installEventFilter(this);
   this->mapChanged();
 }
 
 pqVDIColorsWidget::~pqVDIColorsWidget() {
+  this->endDrag();
   delete this->Dialog;
 }
 
@@ -97,6 +104,31 @@ void pqVDIColorsWidget::mapChanged() {
 
 void pqVDIColorsWidget::closeWhereNothingIsShown() {
   if (pqActiveObjects::instance().activeRepresentation() == nullptr) delete this->Dialog;
+}
+
+/// Makes all edits of a drag one step for Undo. The editor applies, and records, each movement of the mouse.
+bool pqVDIColorsWidget::eventFilter(QObject* watched, QEvent* event) {
+  if (event->type() == QEvent::MouseButtonPress && !this->IsDragging && this->Dialog) {
+    auto* widget = qobject_cast<QWidget*>(watched);
+    // Buttons record steps of their own.
+    if (widget != nullptr && widget->window() == this->Dialog &&
+        qobject_cast<QAbstractButton*>(widget) == nullptr) {
+      this->IsDragging = true;
+      BEGIN_UNDO_SET(tr("Edit Color Map"));
+    }
+  } else if (event->type() == QEvent::MouseButtonRelease && this->IsDragging) {
+    // The editor's widgets record a change soon after the event that made it.
+    constexpr int recordedMilliseconds = 50;
+    QTimer::singleShot(recordedMilliseconds, this, [this] {
+      if (QApplication::mouseButtons() == Qt::NoButton) this->endDrag();
+    });
+  }
+  return pqPropertyWidget::eventFilter(watched, event);
+}
+
+void pqVDIColorsWidget::endDrag() {
+  if (!std::exchange(this->IsDragging, false)) return;
+  END_UNDO_SET();
 }
 
 void pqVDIColorsWidget::keepMaps(vtkSMProxy* map) {
