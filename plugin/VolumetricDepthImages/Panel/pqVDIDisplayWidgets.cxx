@@ -6,6 +6,7 @@
 #include <vtkSMProperty.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMProxy.h>
+#include <QCheckBox>
 
 #include <algorithm>
 #include <array>
@@ -50,6 +51,16 @@ bool isIdle(pqPropertyWidget* widget) {
   return std::find(idle.begin(), idle.end(), name) != idle.end();
 }
 
+/// Whether this is the projection of a VDI, which ParaView would call what it calls that of the view.
+bool isProjection(pqPropertyWidget* widget) {
+  vtkSMProxy* proxy = widget->proxy();
+  vtkSMProperty* property = widget->property();
+  if (proxy == nullptr || property == nullptr || proxy->GetXMLName() == nullptr) return false;
+  const std::string_view name(proxy->GetXMLName());
+  return (name == "VolumetricDepthImage" || name == "RenderVDI") &&
+         property == proxy->GetProperty("CameraParallelProjection");
+}
+
 }  // namespace
 
 pqVDIHiddenDecorator::pqVDIHiddenDecorator(pqPropertyWidget* parent)
@@ -68,4 +79,7 @@ pqVDIDisplayWidgets::pqVDIDisplayWidgets(QObject* parent) : QObject(parent) {}
 
 void pqVDIDisplayWidgets::createDefaultWidgetDecorators(pqPropertyWidget* widget) {
   if (isIdle(widget)) new pqVDIHiddenDecorator(widget);
+  if (!isProjection(widget)) return;
+  // Scripts know the property by the label that the XML gives it.
+  if (auto* box = widget->findChild<QCheckBox*>()) box->setText(tr("Parallel Projection of the VDI"));
 }
