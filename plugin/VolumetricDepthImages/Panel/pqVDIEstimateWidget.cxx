@@ -71,7 +71,7 @@ pqVDIEstimateWidget::pqVDIEstimateWidget(vtkSMProxy* proxy, vtkSMProperty*, QWid
   this->connect(&pqActiveObjects::instance(), &pqActiveObjects::viewChanged, &this->Soon,
                 QOverload<>::of(&QTimer::start));
   if (auto* regenerator = pqVDIRegenerator::of(vtkSMVDIGeneratorProxy::SafeDownCast(proxy)))
-    this->connect(regenerator, &pqVDIRegenerator::progress, &this->Soon, QOverload<>::of(&QTimer::start));
+    this->connect(regenerator, &pqVDIRegenerator::noted, &this->Soon, QOverload<>::of(&QTimer::start));
   this->estimate();
 }
 

@@ -53,7 +53,8 @@ pqVDIRegenerateWidget::pqVDIRegenerateWidget(vtkSMProxy* proxy, vtkSMProperty*, 
   this->connect(&pqActiveObjects::instance(), &pqActiveObjects::viewChanged, this,
                 &pqVDIRegenerateWidget::showAuto);
   if (auto* regenerator = pqVDIRegenerator::of(vtkSMVDIGeneratorProxy::SafeDownCast(proxy))) {
-    this->connect(regenerator, &pqVDIRegenerator::progress, this, &pqVDIRegenerateWidget::showProgress);
+    this->connect(regenerator, &pqVDIRegenerator::noted, this, &pqVDIRegenerateWidget::showNote);
+    this->Line->setText(regenerator->lastNote());
     this->connect(regenerator, &pqVDIRegenerator::autoViewChanged, this, &pqVDIRegenerateWidget::showAuto);
   }
   this->showAuto();
@@ -106,7 +107,7 @@ void pqVDIRegenerateWidget::showAuto() {
   this->Auto->setText(elsewhere ? tr("Auto, in %1").arg(view->getSMName()) : tr("Auto"));
 }
 
-void pqVDIRegenerateWidget::showProgress(int percent) {
+void pqVDIRegenerateWidget::showNote(const QString& note) {
   this->Looking.stop();
-  this->Line->setText(percent >= 0 ? tr("Regenerating the VDI: %1 %").arg(percent) : QString());
+  this->Line->setText(note);
 }

@@ -1,5 +1,5 @@
 // The property widget `vdi_regenerate`. It has a button that regenerates the VDI from the active view, and a
-// line with the progress in percent, or with the reason why the view can't be used. A box sets Auto at once,
+// line that says what the regenerator notes, or why the view can't be used. A box sets Auto at once,
 // without Apply, because it changes no data.
 #ifndef pqVDIRegenerateWidget_h
 #define pqVDIRegenerateWidget_h
@@ -24,7 +24,7 @@ class pqVDIRegenerateWidget : public pqPropertyWidget {
   Q_SLOT void setAuto(bool on);
   Q_SLOT void showAuto();
   Q_SLOT void lookAgain();
-  Q_SLOT void showProgress(int percent);
+  Q_SLOT void showNote(const QString& note);
 
   QLabel* Line;
   QCheckBox* Auto;

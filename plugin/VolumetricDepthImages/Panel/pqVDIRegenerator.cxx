@@ -11,12 +11,15 @@
 #include <pqView.h>
 #include <vtkCamera.h>
 #include <vtkCommand.h>
+#include <vtkOutputWindow.h>
 #include <vtkSMComparativeViewProxy.h>
 #include <vtkSMProperty.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMRenderViewProxy.h>
 #include <vtkWeakPointer.h>
 #include <QApplication>
+#include <QEvent>
+#include <QWidget>
 
 #include <algorithm>
 #include <string>
@@ -26,6 +29,7 @@
 #include "VDIViews.h"
 #include "vtkSMVDIGeneratorProxy.h"
 #include "vtkVDIGenerator.h"
+#include "vtkVDIProp.h"
 #include "vtkVDIRepresentation.h"
 
 namespace {
@@ -34,6 +38,8 @@ constexpr int lookMilliseconds = 40;
 constexpr int lookAtViewsMilliseconds = 250;
 /// The time that an edit rests before the VDI is regenerated.
 constexpr int editRestMilliseconds = 400;
+constexpr int showMilliseconds = 100;
+constexpr int mostRestarts = 5;
 
 std::array<double, 10> numbersOf(vtkCamera* camera) {
   std::array<double, 10> numbers{};
@@ -57,6 +63,9 @@ pqVDIRegenerator::pqVDIRegenerator(pqPipelineSource* source) : QObject(source), 
   this->LookingAtViews.setInterval(lookAtViewsMilliseconds);
   this->connect(&this->LookingAtViews, &QTimer::timeout, this, &pqVDIRegenerator::lookAtViews);
   this->LookingAtViews.start();
+  this->Showing.setInterval(showMilliseconds);
+  this->connect(&this->Showing, &QTimer::timeout, this, &pqVDIRegenerator::lookWhatIsShown);
+  QApplication::instance()->installEventFilter(this);
   for (const char* name : {"LookupTable", "ScalarOpacityFunction"}) {
     pqCoreUtilities::connect(source->getProxy()->GetProperty(name), vtkCommand::ModifiedEvent, this,
                              SLOT(watchMaps()));
@@ -142,7 +151,7 @@ void pqVDIRegenerator::stateChanged() {
   this->Now = State::Idle;
   pv::command(this->generator(), "Hold");  // gives the running preparation up
   pv::command(this->generator(), "Release");
-  Q_EMIT this->progress(-1);
+  this->note({});
 }
 
 /// Makes views wait while an animation is playing. Otherwise they would show none of its steps.
@@ -179,6 +188,9 @@ void pqVDIRegenerator::beginRender() {
 }
 
 void pqVDIRegenerator::endRender() {
+  auto* view = qobject_cast<pqView*>(this->sender());
+  this->ToDraw.removeAll(view);
+  if (view != nullptr && this->isShownIn(view) && pv::isBehind(view)) this->Showing.start();
   if (!this->IsCaptured) return;
   this->IsCaptured = false;
   this->lookWhetherViewsWait();
@@ -199,14 +211,47 @@ void pqVDIRegenerator::lookWhetherViewsWait() {
   const bool defers = this->comparativeViews().empty() && !this->IsCaptured && !this->IsPlaying;
   if (defers == this->Defers) return;
   this->Defers = defers;
+  this->Restarts = 0;
   pv::command(this->generator(), defers ? "DeferViews" : "DeferNoViews");
 }
 
-/// Starts a preparation if the view has asked for a VDI that isn't made yet.
+/// Starts a preparation if the view has asked for a VDI that isn't made yet. Stops if several were made in
+/// vain.
 void pqVDIRegenerator::viewUpdated() {
   if (this->Now != State::Idle || !this->Defers) return;
   auto* view = qobject_cast<pqView*>(this->sender());
-  if (view != nullptr && this->isShownIn(view) && this->generator()->IsOutdated()) this->drawSoon();
+  if (view == nullptr || !this->isShownIn(view)) return;
+  if (!this->generator()->IsOutdated()) {
+    this->Restarts = 0;
+  } else if (this->Restarts < mostRestarts) {
+    this->drawSoon();
+  } else if (this->Restarts == mostRestarts) {
+    this->stop();
+  }
+}
+
+void pqVDIRegenerator::stop() {
+  this->Restarts = mostRestarts + 1;  // says so once
+  this->Showing.stop();
+  const QString why =
+      tr("The input changes with each update: %1 VDIs in a row were out of date before they could be shown. "
+         "No "
+         "more are made until you change something or click into the view. Save Data makes one nevertheless.")
+          .arg(mostRestarts);
+  this->note(why);
+  vtkOutputWindowDisplayWarningText(
+      QString("%1: %2\n").arg(this->Source->getSMName(), why).toUtf8().constData());
+}
+
+bool pqVDIRegenerator::eventFilter(QObject* watched, QEvent* event) {
+  if (event->type() == QEvent::MouseButtonPress || event->type() == QEvent::KeyPress) this->Restarts = 0;
+  return QObject::eventFilter(watched, event);
+}
+
+void pqVDIRegenerator::note(const QString& text) {
+  if (text == this->Note) return;
+  this->Note = text;
+  Q_EMIT this->noted(text);
 }
 
 void pqVDIRegenerator::drawSoon() {
@@ -255,12 +300,13 @@ void pqVDIRegenerator::look() {
     if (const int earlier = this->preparation(); earlier >= 0 && earlier < 100) return;
     pv::command(this->generator(), "Prepare");
     this->Now = State::Preparing;
-    Q_EMIT this->progress(0);
+    this->Showing.stop();
+    this->note(tr("Regenerating the VDI: %1 %").arg(0));
     return;
   }
   const int percent = this->preparation();
   if (percent >= 0 && percent < 100) {
-    Q_EMIT this->progress(percent);
+    this->note(tr("Regenerating the VDI: %1 %").arg(percent));
     return;
   }
   this->finish();
@@ -273,8 +319,34 @@ void pqVDIRegenerator::finish() {
   this->generator()->MarkDirty(this->generator());
   // These views have kept the held filter's output.
   for (pqView* view : this->comparativeViews()) view->getProxy()->MarkDirty(this->generator());
-  Q_EMIT this->progress(-1);
+  ++this->Restarts;
+  this->ToDraw.clear();
+  for (pqView* view : this->Source->getViews()) {
+    if (this->isShownIn(view) && view->widget() != nullptr && view->widget()->isVisible())
+      this->ToDraw.append(view);
+  }
+  this->Showing.start();
   pv::renderViewsOf(this->Source);
+}
+
+/// Says what the views have yet to show. They draw rough pictures at first, with the last VDI until the next
+/// one is loaded.
+void pqVDIRegenerator::lookWhatIsShown() {
+  if (this->Now == State::Preparing) return;  // which has a note of its own
+  this->ToDraw.removeAll(nullptr);
+  bool isLoading = !this->ToDraw.isEmpty();
+  bool isRough = false;
+  for (pqView* view : this->Source->getViews()) {
+    if (!this->isShownIn(view)) continue;
+    for (const vtkVDIProp* vdi : pv::vdisOf(view)) {
+      isLoading |= vdi->IsLoading();
+      isRough |= vdi->IsBehind();
+    }
+  }
+  if (!isLoading && !isRough) this->Showing.stop();
+  this->note(isLoading ? tr("Loading the VDI into the view")
+             : isRough ? tr("Refining the picture")
+                       : QString());
 }
 
 QString pqVDIRegenerator::regenerate(pqView* view) {

@@ -5,6 +5,9 @@
 // mouse button is down, a thread makes the new VDI, which then replaces the old one. The same happens when a
 // view asks for a VDI that isn't made yet, after Apply, Undo or with another time step. The view shows the
 // last VDI meanwhile, unless a picture is taken of it, an animation is playing, or it is a comparative view.
+//
+// An input that changes with each update makes each VDI out of date before a view can show it. After five of
+// them, this object stops until a user does something.
 #ifndef pqVDIRegenerator_h
 #define pqVDIRegenerator_h
 
@@ -41,11 +44,18 @@ class pqVDIRegenerator : public QObject {
   /// didn't show the VDI, or has been closed, it is the first active view that does; null before there is
   /// one.
   pqView* autoView() const { return this->AutoView; }
+  /// What `noted` said last.
+  const QString& lastNote() const { return this->Note; }
 
  Q_SIGNALS:
-  /// The progress of the VDI being made in percent; -1 if there is none.
-  void progress(int percent);
+  /// What the panel says of the VDI being made, or of the picture that the views show of it; "" if there is
+  /// nothing more to come.
+  void noted(const QString& note);
   void autoViewChanged();
+
+ protected:
+  /// Watches for a user's keys and mouse buttons, after which a VDI is tried again.
+  bool eventFilter(QObject* watched, QEvent* event) override;
 
  private:
   Q_SLOT void watchMaps();
@@ -63,6 +73,7 @@ class pqVDIRegenerator : public QObject {
   Q_SLOT void proxyAdded(pqProxy* proxy);
   Q_SLOT void viewUpdated();
   Q_SLOT void drawSoon();
+  Q_SLOT void lookWhatIsShown();
 
   enum class State { Idle, Waiting, Preparing };
 
@@ -76,15 +87,21 @@ class pqVDIRegenerator : public QObject {
   int preparation();
   void hold(int restMilliseconds);
   void finish();
+  void stop();
+  void note(const QString& text);
   void forgetMaps();
 
   pqPipelineSource* Source;
   State Now = State::Idle;
-  QTimer Looking;         // runs unless Now is Idle
-  QTimer LookingAtViews;  // watches cameras for Auto
-  QElapsedTimer Resting;  // time since the last edit
-  qint64 Rest = 0;        // milliseconds that an edit must rest
-  bool IsAuto = false;    // the last value of Auto
+  QTimer Looking;                  // runs unless Now is Idle
+  QTimer LookingAtViews;           // watches cameras for Auto
+  QTimer Showing;                  // runs while views have yet to show the last VDI in full
+  QList<QPointer<pqView>> ToDraw;  // views that haven't been drawn since there was another VDI
+  QString Note;                    // what `noted` said last
+  int Restarts = 0;                // VDIs in a row that were made in vain, without a user's doing
+  QElapsedTimer Resting;           // time since the last edit
+  qint64 Rest = 0;                 // milliseconds that an edit must rest
+  bool IsAuto = false;             // the last value of Auto
   QPointer<pqView> AutoView;
   std::array<double, 10> LastCamera{};
   bool Defers = false;      // true if views don't wait

@@ -4,9 +4,6 @@
 #include <pqServerManagerModel.h>
 #include <pqView.h>
 #include <vtkPVRenderView.h>
-#include <vtkPropCollection.h>
-#include <vtkRenderer.h>
-#include <vtkSMViewProxy.h>
 #include <QApplication>
 #include <QEvent>
 
@@ -14,6 +11,7 @@
 #include <vector>
 
 #include "VDIServers.h"
+#include "VDIViews.h"
 #include "vtkVDIProp.h"
 #include "vtkVDIRepresentation.h"
 
@@ -21,31 +19,8 @@ namespace {
 
 constexpr int watchMilliseconds = 30;
 
-vtkPVRenderView* renderViewOf(pqView* view) {
-  return vtkPVRenderView::SafeDownCast(view->getViewProxy()->GetClientSideView());
-}
-
-/// The VDIs that the last frame showed or was to show.
-std::vector<vtkVDIProp*> vdisOf(pqView* view) {
-  std::vector<vtkVDIProp*> vdis;
-  vtkPVRenderView* drawn = renderViewOf(view);
-  if (drawn == nullptr) return vdis;
-  vtkPropCollection* props = drawn->GetRenderer()->GetViewProps();
-  vtkCollectionSimpleIterator at;
-  props->InitTraversal(at);
-  while (vtkProp* prop = props->GetNextProp(at)) {
-    if (auto* vdi = vtkVDIProp::SafeDownCast(prop)) vdis.push_back(vdi);
-  }
-  return vdis;
-}
-
-bool isBehind(pqView* view) {
-  const std::vector<vtkVDIProp*> vdis = vdisOf(view);
-  return std::any_of(vdis.begin(), vdis.end(), [](const vtkVDIProp* vdi) { return vdi->IsBehind(); });
-}
-
 bool hasMore(pqView* view) {
-  const std::vector<vtkVDIProp*> vdis = vdisOf(view);
+  const std::vector<vtkVDIProp*> vdis = pv::vdisOf(view);
   return std::any_of(vdis.begin(), vdis.end(), [](const vtkVDIProp* vdi) { return vdi->HasMore(); });
 }
 
@@ -68,7 +43,7 @@ bool pqVDIStillFrames::eventFilter(QObject* watched, QEvent* event) {
     case QEvent::KeyPress:
       for (const QPointer<pqView>& view : this->Behind) {
         if (view == nullptr) continue;
-        for (vtkVDIProp* vdi : vdisOf(view)) vdi->Rest();
+        for (vtkVDIProp* vdi : pv::vdisOf(view)) vdi->Rest();
       }
       break;
     default:
@@ -88,7 +63,7 @@ void pqVDIStillFrames::viewAdded(pqView* view) {
 
 void pqVDIStillFrames::begins() {
   auto* view = qobject_cast<pqView*>(this->sender());
-  vtkPVRenderView* drawn = view != nullptr ? renderViewOf(view) : nullptr;
+  vtkPVRenderView* drawn = view != nullptr ? pv::renderViewOf(view) : nullptr;
   if (drawn != nullptr) vtkVDIRepresentation::DeferStillFrames(drawn);
 }
 
@@ -96,7 +71,7 @@ void pqVDIStillFrames::rendered() {
   auto* view = qobject_cast<pqView*>(this->sender());
   if (view == nullptr) return;
   this->Behind.removeAll(view);
-  if (!isBehind(view)) return;
+  if (!pv::isBehind(view)) return;
   this->Behind.append(view);
   this->Looking.start();
 }
@@ -105,7 +80,7 @@ void pqVDIStillFrames::look() {
   const QList<QPointer<pqView>> views = this->Behind;
   for (const QPointer<pqView>& view : views) {
     if (view != nullptr && !pv::mayAsk(view->getServer())) continue;
-    if (view != nullptr && isBehind(view)) {
+    if (view != nullptr && pv::isBehind(view)) {
       if (hasMore(view)) view->forceRender();
     } else {
       this->Behind.removeAll(view);

@@ -131,6 +131,9 @@ vtkSMVDIRepresentationProxy::Legend vtkSMVDIRepresentationProxy::LegendOfFile(vt
 /// Takes the legend of the input. If the old map has a bar in `view`, the new map's bar replaces it. `view`
 /// may be null.
 void vtkSMVDIRepresentationProxy::TakeLegend(vtkSMProxy* view) {
+  // While the next VDI is being made, the view shows the last one, of another array perhaps.
+  auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(pv::proxyIn(this, "Input"));
+  if (view != nullptr && generator != nullptr && this->HasLegend() && generator->IsOutdated()) return;
   const Legend legend = this->LegendOfInput();
   if (legend.Colors == nullptr) {
     if (this->GetUsingScalarColoring()) this->DropLegend();

@@ -251,6 +251,10 @@ bool vtkVDIProp::IsBehind() const {
   return this->Internal->IsBehind;
 }
 
+bool vtkVDIProp::IsLoading() const {
+  return this->IsBehind() && this->Internal->Buffers.isLoading();
+}
+
 bool vtkVDIProp::HasMore() const {
   pv::VDIBuffers& buffers = this->Internal->Buffers;
   return this->IsBehind() && (buffers.isLoading() ? buffers.hasLoaded() : !buffers.still().isBeingMade());

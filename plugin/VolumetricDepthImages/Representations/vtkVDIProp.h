@@ -58,6 +58,8 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkVDIProp : public vtkProp
   void Prepare(vtkDataObject* piece, FrameKind frame);
   /// Whether the last frame was deferred and lacks something that is being made.
   bool IsBehind() const;
+  /// Whether the last frame showed the last VDI, because the next one is being loaded.
+  bool IsLoading() const;
   /// Whether the missing part is ready, so that another frame would show it.
   bool HasMore() const;
   /// Pauses the threads in the background for a moment, so that the window gets the processor.
