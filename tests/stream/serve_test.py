@@ -228,7 +228,7 @@ class ServeTest(ServedFolder):
         policy = desk.get("/")[0].getheader("Content-Security-Policy")
         self.assertTrue(policy.endswith("frame-ancestors https://desk.example http://b.example:81"), policy)
 
-    def test_http(self):
+    def test_http_codes(self):
         """Status codes for requests that aren't understood, and for other methods."""
         server = self.serve(self.made / "small0.vdi")
         host = b" HTTP/1.1\r\nHost: a\r\n"
