@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
+#include <memory>
 #include <optional>
 #include <variant>
 #include <vector>
@@ -26,8 +28,8 @@ std::vector<Block> decomposed(const glm::ivec3& size, const glm::ivec3& blocks, 
 }
 
 /// `top`: the highest scalar.
-CompactLists listsOf(const std::vector<Block>& blocks, double top) {
-  VdiGenerator generator(test::device(), comm::Communicator::serial());
+CompactLists listsOf(const std::vector<Block>& blocks, double top, bool gpuPrograms = false) {
+  VdiGenerator generator(test::device(gpuPrograms), comm::Communicator::serial());
   generator.setBlocks(blocks);
   const std::optional<Vdi> vdi =
       generator.generate(test::oblique(), test::threeHues(top * 0.8), test::smallSettings(47, 35, 8));
@@ -45,6 +47,23 @@ bool equal(const CompactLists& a, const CompactLists& b) {
 
 std::vector<Block> laidOut(std::vector<Block> blocks, const test::Layout& layout) {
   for (Block& block : blocks) block = test::laidOut(block, layout);
+  return blocks;
+}
+
+/// Copies of the blocks. Some of their floats are infinite, or not a number.
+std::vector<Block> withHoles(std::vector<Block> blocks) {
+  for (Block& block : blocks) {
+    const auto values = std::make_shared<std::vector<std::byte>>(block.byteCount());
+    block.copyTo(block.stored(), values->data());
+    if (block.type == ScalarType::F32 || block.type == ScalarType::F64) {
+      constexpr double infinity = std::numeric_limits<double>::infinity();
+      storeValue(block.type, values->data(), block.valueCount() / 3, infinity);
+      storeValue(block.type, values->data(), block.valueCount() / 2, -infinity);
+      storeValue(block.type, values->data(), block.valueCount() / 4, std::nan(""));
+    }
+    block.data = values->data();
+    block.keepAlive = values;
+  }
   return blocks;
 }
 
@@ -80,6 +99,19 @@ TEST_CASE("a VDI is the same in any layout of its blocks' values") {
     CHECK(equal(listsOf(laidOut(packed, layout), type), expected));
   }
   CHECK(test::device()->validationMessages() == "");
+}
+
+TEST_CASE("a shader makes the texels that the host makes of values of any type") {
+  const auto type = GENERATE(ScalarType::U8, ScalarType::I8, ScalarType::U16, ScalarType::I16,
+                             ScalarType::U32, ScalarType::I32, ScalarType::F32, ScalarType::F64);
+  INFO(toString(type));
+  for (const glm::ivec3& count : {glm::ivec3(1), glm::ivec3(3, 2, 2)}) {
+    const std::vector<Block> blocks = withHoles(decomposed({27, 22, 24}, count, Joint::Cells, type));
+    const CompactLists expected = listsOf(blocks, test::topOf(type));
+    CHECK(expected.segments.size() > 1000);
+    CHECK(equal(listsOf(blocks, test::topOf(type), true), expected));
+  }
+  CHECK(test::device(true)->validationMessages() == "");
 }
 
 TEST_CASE("a device that reads rows and slices from the host's memory finds them") {

@@ -154,6 +154,31 @@ void Block::copyTo(const IndexBox& box, void* to) const {
               packedStrides(box.size(), bytes), box.size(), bytes);
 }
 
+void Block::copyTo(const IndexBox& box, void* to, const ByteStrides& apart) const {
+  assert(!box.empty() && box == box.intersection(stored()));
+  const std::size_t bytes = sizeOf(type);
+  if (!computed) {
+    const ByteStrides from = strides.value_or(packedStrides(dims, bytes));
+    return copyStrided(static_cast<const std::byte*>(data) + offsetOf(box.lo, from), from, to, apart,
+                       box.size(), bytes);
+  }
+  const Tiling tiles = tilesOf(box);
+  TileBuffer buffer;
+  for (std::size_t i = 0; i < tiles.count(); ++i) {
+    const IndexBox tile = tiles[i];
+    computed->read(tile, buffer.bytes.data());
+    copyStrided(buffer.bytes.data(), packedStrides(tile.size(), bytes),
+                static_cast<std::byte*>(to) + offsetOf(tile.lo - box.lo, apart), apart, tile.size(), bytes);
+  }
+}
+
+void Patch::copyTo(ScalarType type, const IndexBox& part, void* to, const ByteStrides& strides) const {
+  if (!values) return donor->copyTo({part.lo + shift, part.hi + shift}, to, strides);
+  const std::size_t bytes = sizeOf(type);
+  copyStrided(static_cast<const std::byte*>(values.get()) + box.position(part.lo) * bytes,
+              packedStrides(box.size(), bytes), to, strides, part.size(), bytes);
+}
+
 Tiling Block::tilesOf(const IndexBox& box) const {
   return {box, strides ? fastestAxis(*strides) : 0};
 }
@@ -170,7 +195,9 @@ double valueAt(const Block& block, int i, int j, int k) {
   assert(block.extended().contains(at));
   const std::span<const Patch> patches = block.patchList();
   for (auto patch = patches.rbegin(); patch != patches.rend(); ++patch) {
-    if (patch->box.contains(at)) return loadValue(block.type, patch->values.get(), patch->box.position(at));
+    if (!patch->box.contains(at)) continue;
+    if (!patch->values) return storedValueAt(*patch->donor, at + patch->shift);
+    return loadValue(block.type, patch->values.get(), patch->box.position(at));
   }
   return storedValueAt(block, at);
 }
@@ -218,6 +245,8 @@ ScalarRange finiteRangeIn(const Block& block, const IndexBox& box) {
 }
 
 ScalarRange finiteRangeOf(ScalarType type, const Patch& patch) {
+  if (!patch.values)
+    return finiteRangeIn(*patch.donor, {patch.box.lo + patch.shift, patch.box.hi + patch.shift});
   return withTyped(type, patch.values.get(), [&patch](const auto* values) {
     Extremes<std::remove_cvref_t<decltype(*values)>> extremes;
     extremes.include(std::span(values, patch.box.count()));

@@ -25,10 +25,18 @@ struct GhostLayers {
   bool operator==(const GhostLayers&) const = default;
 };
 
-/// Values that extend the stored ones or replace some of them.
+struct Block;
+
+/// Values that extend the stored ones or replace some of them: an array, or stored values of another block of
+/// the same scalar type, which are read where they lie.
 struct Patch {
   IndexBox box;  // indices relative to the first stored value; may reach outside [0, dims)
-  std::shared_ptr<const void> values;  // [size.z][size.y][size.x], x fastest, of the block's scalar type
+  std::shared_ptr<const void> values{};  // [size.z][size.y][size.x], x fastest, of the block's scalar type
+  std::shared_ptr<const Block> donor{};  // used if `values` is null
+  glm::ivec3 shift{0};                   // added to an index, gives that in the donor
+
+  /// Copies the values of a part of the box to places that lie `strides` apart, of any alignment.
+  void copyTo(ScalarType type, const IndexBox& part, void* to, const ByteStrides& strides) const;
 };
 
 /// The stored values of a block that the data consist of. Others lie in ghost layers, are covered by finer
@@ -116,6 +124,8 @@ struct Block {
   /// Copies the stored values of a box within stored(), [size.z][size.y][size.x], to memory that is aligned
   /// for them.
   void copyTo(const IndexBox& box, void* to) const;
+  /// Copies them to places that lie `strides` apart, which need not be aligned.
+  void copyTo(const IndexBox& box, void* to, const ByteStrides& strides) const;
   /// Divides a box into tiles that copyTo can copy one by one into a reused buffer that fits the cache.
   Tiling tilesOf(const IndexBox& box) const;
 

@@ -214,6 +214,14 @@ void Commands::endUpload(const SampledImage& image) {
                VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
 }
 
+void Commands::beginStores(const SampledImage& image) {
+  changeLayout(buffer_, image, VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL, VK_IMAGE_LAYOUT_GENERAL);
+}
+
+void Commands::endStores(const SampledImage& image) {
+  changeLayout(buffer_, image, VK_IMAGE_LAYOUT_GENERAL, VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
+}
+
 void Commands::copyToImage(const Buffer& from, std::uint64_t fromOffset, const SampledImage& to,
                            const glm::uvec3& texelOffset, const glm::uvec3& texelExtent,
                            const glm::uvec2& pitch) {

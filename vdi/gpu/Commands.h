@@ -114,6 +114,11 @@ class Commands {
   void beginUpload(const SampledImage& image);
   /// Makes the image ready to be sampled again.
   void endUpload(const SampledImage& image);
+  /// Makes an image that is ready to be sampled ready for shaders that store to it; its texels stay
+  /// unchanged.
+  void beginStores(const SampledImage& image);
+  /// Makes the image ready to be sampled again.
+  void endStores(const SampledImage& image);
   /// Copies texels, x fastest, from the buffer into a box of the image. `pitch` is the number of texels from
   /// row to row and of rows from slice to slice; 0: tightly packed.
   void copyToImage(const Buffer& from, std::uint64_t fromOffset, const SampledImage& to,

@@ -33,6 +33,8 @@ std::vector<DescriptorBinding> descriptorBindings(const ComputePipelineInfo& inf
   if (info.imageCount > 0)
     bindings.push_back({descriptorImages, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, info.imageCount});
   if (info.hasPlane) bindings.push_back({descriptorPlane, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 1});
+  if (info.storeCount > 0)
+    bindings.push_back({descriptorStores, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, info.storeCount});
   if (info.uniformBytes > 0) bindings.push_back({descriptorUniforms, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1});
   return bindings;
 }
@@ -109,9 +111,8 @@ void CompiledPipeline::release() noexcept {
 std::shared_ptr<const CompiledPipeline> CompiledPipelines::of(const PipelineTarget& target,
                                                               const ComputePipelineInfo& info,
                                                               const Made& made) {
-  Key key{std::string(info.shader), info.pushConstantBytes, info.imageCount,
-          info.uniformBytes > 0,    info.hasPlane,          info.wholeSubgroups,
-          info.specialization};
+  Key key{std::string(info.shader), info.pushConstantBytes, info.imageCount,     info.storeCount,
+          info.uniformBytes > 0,    info.hasPlane,          info.wholeSubgroups, info.specialization};
   {
     const std::lock_guard lock(mutex_);
     if (const auto found = pipelines_.find(key); found != pipelines_.end()) return found->second;

@@ -28,6 +28,7 @@ struct ComputePipelineInfo {
   std::uint32_t pushConstantBytes = 0;        // at most 128
   std::uint32_t imageCount = 0;               // size of the sampler3D array at set 0, binding 0
   std::uint32_t uniformBytes = 0;             // size of the uniform block at set 0, binding 1; 0: none
+  std::uint32_t storeCount = 0;               // size of the image3D array at set 0, binding 3
   bool hasPlane = false;                      // whether there is a sampler2D at set 0, binding 2
   bool wholeSubgroups = false;                // full subgroups of subgroupSize, which divides the workgroup
   std::vector<std::uint32_t> specialization;  // constant_id 0, 1, ... as raw 32-bit words
@@ -46,6 +47,7 @@ ComputePipelineInfo infoOf(std::string_view shader) {
 constexpr std::uint32_t descriptorImages = 0;
 constexpr std::uint32_t descriptorUniforms = 1;
 constexpr std::uint32_t descriptorPlane = 2;
+constexpr std::uint32_t descriptorStores = 3;
 /// A binding of the pipeline's descriptor set.
 struct DescriptorBinding {
   std::uint32_t binding;
@@ -98,10 +100,10 @@ class CompiledPipelines {
   void clear() noexcept { pipelines_.clear(); }
 
  private:
-  /// All of ComputePipelineInfo except the size of uniforms: shader, bytes of push constants, images, whether
-  /// there are uniforms, plane, whole subgroups, specialisation.
-  using Key =
-      std::tuple<std::string, std::uint32_t, std::uint32_t, bool, bool, bool, std::vector<std::uint32_t>>;
+  /// All of ComputePipelineInfo except the size of uniforms: shader, bytes of push constants, images, images
+  /// to store to, whether there are uniforms, plane, whole subgroups, specialisation.
+  using Key = std::tuple<std::string, std::uint32_t, std::uint32_t, std::uint32_t, bool, bool, bool,
+                         std::vector<std::uint32_t>>;
   std::mutex mutex_;
   std::map<Key, std::shared_ptr<const CompiledPipeline>> pipelines_;
 };

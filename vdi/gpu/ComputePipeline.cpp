@@ -57,6 +57,13 @@ void ComputePipeline::bindImages(std::span<const SampledImage* const> images, co
   bind(descriptorImages, images, sampler);
 }
 
+void ComputePipeline::bindStores(std::span<const SampledImage* const> images) {
+  std::vector<VkDescriptorImageInfo> infos;
+  for (const SampledImage* image : images)
+    infos.push_back({VK_NULL_HANDLE, image->view(), VK_IMAGE_LAYOUT_GENERAL});
+  write(descriptorStores, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, infos);
+}
+
 void ComputePipeline::bindPlane(const SampledImage& image, const Sampler& sampler) {
   assert(hasPlane_);
   const SampledImage* const images[] = {&image};
@@ -68,16 +75,14 @@ void ComputePipeline::bind(std::uint32_t binding, std::span<const SampledImage* 
   std::vector<VkDescriptorImageInfo> infos;
   for (const SampledImage* image : images)
     infos.push_back({sampler.handle(), image->view(), VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL});
-  const VkWriteDescriptorSet write{VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
-                                   nullptr,
-                                   set_,
-                                   binding,
-                                   0,
-                                   static_cast<std::uint32_t>(infos.size()),
-                                   VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
-                                   infos.data(),
-                                   nullptr,
-                                   nullptr};
+  write(binding, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, infos);
+}
+
+void ComputePipeline::write(std::uint32_t binding, VkDescriptorType type,
+                            std::span<const VkDescriptorImageInfo> infos) {
+  const VkWriteDescriptorSet write{
+      VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,   nullptr, set_,         binding, 0,
+      static_cast<std::uint32_t>(infos.size()), type,    infos.data(), nullptr, nullptr};
   vkUpdateDescriptorSets(device_->vulkan().handle(), 1, &write, 0, nullptr);
 }
 

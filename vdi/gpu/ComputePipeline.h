@@ -30,6 +30,9 @@ class ComputePipeline {
   /// Writes the descriptor set: exactly imageCount images. Must not be called while a dispatch of this
   /// pipeline is in flight.
   void bindImages(std::span<const SampledImage* const> images, const Sampler& sampler);
+  /// Writes the descriptors of the images to which the shader stores, exactly storeCount, under the same
+  /// condition.
+  void bindStores(std::span<const SampledImage* const> images);
   /// Writes the descriptor of the one 2-D image, under the same condition.
   void bindPlane(const SampledImage& image, const Sampler& sampler);
   /// Writes the descriptor of the uniforms, a buffer of uniformBytes, under the same condition.
@@ -42,6 +45,7 @@ class ComputePipeline {
  private:
   void makeDescriptorSet(const ComputePipelineInfo& info);
   void bind(std::uint32_t binding, std::span<const SampledImage* const> images, const Sampler& sampler);
+  void write(std::uint32_t binding, VkDescriptorType type, std::span<const VkDescriptorImageInfo> infos);
   void release() noexcept;
 
   std::shared_ptr<Device> device_;

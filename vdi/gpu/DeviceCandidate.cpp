@@ -75,6 +75,17 @@ bool filtersLinearly(VkPhysicalDevice device, VkFormat format) {
   return (properties.optimalTilingFeatures & wanted) == wanted;
 }
 
+/// DeviceLimits::storesTexels.
+bool storesTexels(VkPhysicalDevice device, const VkPhysicalDeviceFeatures& features) {
+  constexpr std::array formats{VK_FORMAT_R8_UNORM, VK_FORMAT_R16_UNORM, VK_FORMAT_R32_SFLOAT};
+  return features.shaderFloat64 == VK_TRUE && features.shaderStorageImageWriteWithoutFormat == VK_TRUE &&
+         std::all_of(formats.begin(), formats.end(), [device](VkFormat format) {
+           VkFormatProperties properties;
+           vkGetPhysicalDeviceFormatProperties(device, format, &properties);
+           return (properties.optimalTilingFeatures & VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT) != 0;
+         });
+}
+
 /// DeviceLimits::hostPointerAlignment; 0 without VK_EXT_external_memory_host.
 std::uint64_t hostPointerAlignment(VkPhysicalDevice device) {
   std::uint32_t count = 0;
@@ -147,6 +158,7 @@ void inspectFeatures(VkPhysicalDevice device, DeviceCandidate& candidate) {
   limits.shaderFloat16 = features.v12.shaderFloat16 == VK_TRUE;
   limits.storage16Bit = features.v11.storageBuffer16BitAccess == VK_TRUE;
   limits.storage8Bit = features.v12.storageBuffer8BitAccess == VK_TRUE;
+  limits.storesTexels = storesTexels(device, features.core.features);
   const Subgroups subgroups(device);
   limits.subgroupSize = usefulSubgroupSize(subgroups, features);
   const bool shuffles = subgroups.can(VK_SUBGROUP_FEATURE_SHUFFLE_BIT);

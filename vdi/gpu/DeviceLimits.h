@@ -28,6 +28,8 @@ struct DeviceLimits {
   bool shaderFloat16 = false;
   bool storage16Bit = false;  // storageBuffer16BitAccess
   bool storage8Bit = false;   // storageBuffer8BitAccess
+  /// Whether shaders store texels of all formats of 3-D images, and compute with doubles.
+  bool storesTexels = false;
 };
 
 }  // namespace vdi::gpu

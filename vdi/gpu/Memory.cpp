@@ -283,6 +283,9 @@ SampledImage::SampledImage(std::shared_ptr<Device> device, const glm::uvec3& ext
   const std::uint64_t bytes = std::uint64_t{extent.x} * extent.y * extent.z * texelBytes(format);
   if (bytes > device_->limits().maxAllocationBytes) throwOutOfMemory(*device_, bytes, "texture");
   const QueueFamilies families(*device_);
+  const bool stores = type == VK_IMAGE_TYPE_3D && device_->limits().storesTexels;
+  const VkImageUsageFlags usage = VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT |
+                                  (stores ? VkImageUsageFlags{VK_IMAGE_USAGE_STORAGE_BIT} : 0U);
   try {
     const VkImageCreateInfo info{VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
                                  nullptr,
@@ -294,7 +297,7 @@ SampledImage::SampledImage(std::shared_ptr<Device> device, const glm::uvec3& ext
                                  1,
                                  VK_SAMPLE_COUNT_1_BIT,
                                  VK_IMAGE_TILING_OPTIMAL,
-                                 VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT,
+                                 usage,
                                  families.mode(),
                                  families.count(),
                                  families.data(),

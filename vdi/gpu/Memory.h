@@ -80,7 +80,7 @@ std::optional<ImportedBuffer> importHostMemory(const std::shared_ptr<Device>& de
 
 /// A 3-D or 2-D image that shaders sample, with its view: one mip level, optimal tiling, for both kinds of
 /// queues. Call Commands::clear first, then fill it between Commands::beginUpload and endUpload. Usage:
-/// sampled, transfer destination.
+/// sampled, transfer destination; 3-D images also as DeviceLimits::storesTexels says.
 class SampledImage {
  public:
   SampledImage() = default;

@@ -2,20 +2,26 @@
 
 #include <algorithm>
 #include <cmath>
+#include <condition_variable>
 #include <cstring>
 #include <limits>
+#include <mutex>
 #include <optional>
 #include <utility>
 
+#include "shaders/shared/cast.h"
 #include "shaders/shared/cells.h"
+#include "shaders/shared/place.h"
 #include "vdi/core/BitCast.h"
+#include "vdi/core/Error.h"
 #include "vdi/core/Parallel.h"
 
 namespace vdi::gpu {
 
 namespace {
 
-constexpr std::uint64_t stagingBytes = 32ULL << 20;  // in each of the two buffers
+constexpr std::uint64_t slotBytes = 32ULL << 20;
+constexpr std::size_t maxSlots = 4;  // both the host and the device have memory for each
 
 /// Below this size, importing memory takes longer than copying it.
 constexpr std::uint64_t minImport = 1ULL << 20;
@@ -33,6 +39,12 @@ float filterable(Value texel) {
   const auto infinite = bit_cast<float>(shared::infiniteTexelBits);
   const bool tooLarge = std::abs(texel) > static_cast<Value>(std::numeric_limits<float>::max());
   return tooLarge ? std::copysign(infinite, texel < 0 ? -1.0F : 1.0F) : static_cast<float>(texel);
+}
+
+ComputePipelineInfo placeInfo() {
+  ComputePipelineInfo info = infoOf<shared::PlaceConstants>("place");
+  info.storeCount = shared::castMaxPages;
+  return info;
 }
 
 /// Whether some of the stored values in `part` of a block of f32 are infinite.
@@ -119,44 +131,85 @@ void writeRow(ScalarType type, const void* data, VkFormat format, const ValueMap
   }
 }
 
-/// Writes texels of `box`, in the block's indices, tightly packed: the stored values, covered by the patches.
-void writeBox(const VolumePiece& piece, const IndexBox& box, std::byte* to) {
-  const Block& block = *piece.block;
-  const std::uint64_t bytes = texelBytes(piece.format);
-  std::vector<const Patch*> patches;
-  for (const Patch& patch : block.patchList()) {
-    if (!patch.box.intersection(box).empty()) patches.push_back(&patch);
-  }
-  // Writes `part` from an array that holds the values of the box `of`.
-  const auto writeArray = [&](const void* values, const IndexBox& of, const IndexBox& part) {
-    for (int z = part.lo.z; z < part.hi.z; ++z) {
-      for (int y = part.lo.y; y < part.hi.y; ++y) {
-        const glm::ivec3 at(part.lo.x, y, z);
-        writeRow(block.type, values, piece.format, piece.values, of.position(at),
-                 static_cast<std::size_t>(part.size().x), to + box.position(at) * bytes);
-      }
-    }
-  };
-  const Tiling tiles = block.tilesOf(box);
-  constexpr std::size_t minimum = 64;  // copying these takes some 100 us
-  inParallel(tiles.count(), minimum, [&](std::size_t first, std::size_t last) {
-    TileBuffer buffer;
-    for (std::size_t i = first; i < last; ++i) {
-      const IndexBox tile = tiles[i];
-      const IndexBox stored = block.stored().intersection(tile);
-      if (!stored.empty() && block.isPacked()) {
-        writeArray(block.data, block.stored(), stored);
-      } else if (!stored.empty()) {
-        block.copyTo(stored, buffer.bytes.data());
-        writeArray(buffer.bytes.data(), stored, stored);
-      }
-      for (const Patch* patch : patches) {
-        const IndexBox part = patch->box.intersection(tile);
-        if (!part.empty()) writeArray(patch->values.get(), patch->box, part);
-      }
-    }
-  });
+/// What staged values are: as the simulation stores them, for a shader to place, or texels.
+struct Staged {
+  std::uint32_t type = shared::placeF32;  // for the shader
+  std::uint64_t bytes = 0;                // of a value
+  bool raw = false;                       // not converted on the host
+};
+
+/// Quotients by smaller scales overflow on devices that multiply by the reciprocal.
+constexpr double minScale = 1e-290;
+
+Staged stagedAs(const VolumePiece& piece, bool places) {
+  const ScalarType type = piece.block->type;
+  if (!places || (type == ScalarType::F64 && piece.values.scale < minScale))
+    return {shared::placeF32, texelBytes(piece.format), false};
+  static_assert(static_cast<std::uint32_t>(ScalarType::F64) == shared::placeF64);
+  return {static_cast<std::uint32_t>(type), sizeOf(type), true};
 }
+
+}  // namespace
+
+/// A box of a piece, in the block's indices, to be staged: the stored values, covered by the patches.
+struct VolumeUpload::Load {
+  const VolumePiece* piece = nullptr;
+  IndexBox box;
+  Staged staged;
+  std::uint64_t offset = 0;  // in its slot
+  std::vector<const Patch*> patches;
+
+  /// Writes the values of a tile to the slot's memory.
+  void write(const IndexBox& tile, std::byte* to) const {
+    staged.raw ? writeValues(tile, to + offset) : writeTexels(tile, to + offset);
+  }
+
+ private:
+  void writeValues(const IndexBox& tile, std::byte* to) const {
+    const Block& block = *piece->block;
+    const ByteStrides apart = packedStrides(box.size(), staged.bytes);
+    const IndexBox stored = block.stored().intersection(tile);
+    if (!stored.empty()) block.copyTo(stored, to + offsetOf(stored.lo - box.lo, apart), apart);
+    for (const Patch* patch : patches) {
+      const IndexBox part = patch->box.intersection(tile);
+      if (!part.empty()) patch->copyTo(block.type, part, to + offsetOf(part.lo - box.lo, apart), apart);
+    }
+  }
+
+  void writeTexels(const IndexBox& tile, std::byte* to) const {
+    const Block& block = *piece->block;
+    // Writes `part` from an array that holds the values of the box `of`.
+    const auto writeArray = [&](const void* values, const IndexBox& of, const IndexBox& part) {
+      for (int z = part.lo.z; z < part.hi.z; ++z) {
+        for (int y = part.lo.y; y < part.hi.y; ++y) {
+          const glm::ivec3 at(part.lo.x, y, z);
+          writeRow(block.type, values, piece->format, piece->values, of.position(at),
+                   static_cast<std::size_t>(part.size().x), to + box.position(at) * staged.bytes);
+        }
+      }
+    };
+    TileBuffer buffer;
+    const IndexBox stored = block.stored().intersection(tile);
+    if (!stored.empty() && block.isPacked()) {
+      writeArray(block.data, block.stored(), stored);
+    } else if (!stored.empty()) {
+      block.copyTo(stored, buffer.bytes.data());
+      writeArray(buffer.bytes.data(), stored, stored);
+    }
+    for (const Patch* patch : patches) {
+      const IndexBox part = patch->box.intersection(tile);
+      if (part.empty()) continue;
+      if (patch->values) {
+        writeArray(patch->values.get(), patch->box, part);
+      } else {
+        patch->copyTo(block.type, part, buffer.bytes.data(), packedStrides(part.size(), sizeOf(block.type)));
+        writeArray(buffer.bytes.data(), part, part);
+      }
+    }
+  }
+};
+
+namespace {
 
 /// The alignment of offsets in the buffers from which the transfer queue copies. Whole texels aren't enough
 /// for a queue that does nothing but copying.
@@ -182,16 +235,86 @@ bool isTexels(const VolumePiece& piece) {
 
 }  // namespace
 
-VolumeUpload::VolumeUpload(std::shared_ptr<Device> device)
-    : device_(std::move(device)), halves_{Half(device_), Half(device_)} {}
+/// What fills a slot once.
+struct VolumeUpload::Batch {
+  std::size_t first = 0;  // loads
+  std::size_t last = 0;
+  std::uint64_t bytes = 0;  // of values
+  std::uint64_t end() const { return bytes + (last - first) * sizeof(shared::PlaceJob); }
+};
 
-/// Lets the device copy the staged data while the other half is filled.
-void VolumeUpload::turnOver() {
-  filling().commands.submit();
-  current_ = 1 - current_;
-  filling().commands.begin();  // waits until its data is copied
-  filling().filled = 0;
-}
+/// Loads in the order in which they travel, and how slots are filled with them.
+struct VolumeUpload::Plan {
+  /// What a thread fills at a time: tiles of a load.
+  struct Unit {
+    std::uint32_t load = 0;
+    std::uint32_t batch = 0;
+    std::size_t first = 0;
+    std::size_t last = 0;
+  };
+  std::vector<Load> loads;
+  std::vector<Batch> batches;
+  std::vector<Unit> units;
+
+  /// Adds values, in the piece's block's indices: as many whole slices at a time as the slot has room for, or
+  /// as many whole rows of one slice.
+  void add(const VolumePiece& piece, const IndexBox& values, bool places) {
+    constexpr std::uint64_t alignment = 16;
+    const Staged staged = stagedAs(piece, places);
+    const std::uint64_t rowBytes = static_cast<std::uint64_t>(values.size().x) * staged.bytes;
+    const std::uint64_t sliceBytes = rowBytes * static_cast<std::uint64_t>(values.size().y);
+    glm::ivec3 at = values.lo;
+    while (at.z < values.hi.z) {
+      const bool slices = at.y == values.lo.y && sliceBytes + spareBytes <= slotBytes;
+      const std::uint64_t unit = slices ? sliceBytes : rowBytes;
+      if (batches.empty() || batches.back().end() + unit + spareBytes > slotBytes)
+        batches.push_back({loads.size(), loads.size(), 0});
+      Batch& batch = batches.back();
+      const std::uint64_t offset = (batch.bytes + alignment - 1) / alignment * alignment;
+      const std::uint64_t room = slotBytes - batch.end() - spareBytes;
+      const auto fitting = [&](int left) {
+        return static_cast<int>(std::clamp<std::uint64_t>(room / unit, 1, static_cast<std::uint64_t>(left)));
+      };
+      IndexBox box{at, {values.hi.x, values.hi.y, at.z + 1}};
+      if (slices) {
+        box.hi.z = at.z + fitting(values.hi.z - at.z);
+      } else {
+        box.hi.y = at.y + fitting(values.hi.y - at.y);
+      }
+      batch.bytes = offset + box.count() * staged.bytes;
+      batch.bytes = (batch.bytes + alignment - 1) / alignment * alignment;
+      addLoad({&piece, box, staged, offset, {}});
+      ++batch.last;
+      at.y = box.hi.y;
+      if (at.y == values.hi.y) at = {values.lo.x, values.lo.y, box.hi.z};
+    }
+  }
+
+ private:
+  /// Room for a load's job, and for alignment.
+  static constexpr std::uint64_t spareBytes = sizeof(shared::PlaceJob) + 32;
+
+  void addLoad(Load load) {
+    for (const Patch& patch : load.piece->block->patchList()) {
+      if (!patch.box.intersection(load.box).empty()) load.patches.push_back(&patch);
+    }
+    constexpr std::size_t tilesAtOnce = 16;
+    const std::size_t tiles = load.piece->block->tilesOf(load.box).count();
+    for (std::size_t tile = 0; tile < tiles; tile += tilesAtOnce) {
+      units.push_back({static_cast<std::uint32_t>(loads.size()),
+                       static_cast<std::uint32_t>(batches.size() - 1), tile,
+                       std::min(tile + tilesAtOnce, tiles)});
+    }
+    loads.push_back(std::move(load));
+  }
+};
+
+VolumeUpload::VolumeUpload(std::shared_ptr<Device> device)
+    : device_(std::move(device)),
+      places_(device_->runsGpuPrograms() && device_->limits().storesTexels &&
+              usableCores() >= coresThatCopyFaster),
+      frame_(device_, places_ ? QueueKind::Compute : QueueKind::Transfer),
+      pipelines_(device_, placeInfo()) {}
 
 /// Copies the piece's stored values from host memory. Returns false if the values must be staged instead.
 /// `imported` must stay until the copies are complete.
@@ -213,84 +336,171 @@ bool VolumeUpload::copyDirectly(const VolumePiece& piece, const SampledImage& pa
   if (block.type == ScalarType::F32 && anyInfinite(block, part)) return false;
   std::optional<ImportedBuffer> source = importHostMemory(device_, data + first, end - first);
   if (!source || source->offset % std::max(bytes, offsetAlignment(*device_)) != 0) return false;
-  filling().commands.copyToImage(
-      source->buffer, source->offset, page, piece.place + glm::uvec3(part.lo - piece.first),
-      glm::uvec3(part.size()),
-      {static_cast<std::uint32_t>(pitches->row), static_cast<std::uint32_t>(pitches->rows)});
+  frame_.copyToImage(source->buffer, source->offset, page, piece.place + glm::uvec3(part.lo - piece.first),
+                     glm::uvec3(part.size()),
+                     {static_cast<std::uint32_t>(pitches->row), static_cast<std::uint32_t>(pitches->rows)});
   imported.push_back(std::move(source->buffer));
   return true;
 }
 
-/// `values` is a part of the piece, in the block's indices.
-void VolumeUpload::stage(const VolumePiece& piece, const IndexBox& values, const SampledImage& page) {
-  const std::uint64_t bytes = texelBytes(piece.format);
-  const glm::u64vec3 size(values.size());
-  const std::uint64_t rowBytes = size.x * bytes;
-  const std::uint64_t sliceBytes = rowBytes * size.y;
-  // Stages as many whole slices at a time as the buffer can hold, or as many whole rows of one slice. Vulkan
-  // requires offsets in multiples of 4.
-  glm::ivec3 at = values.lo;
-  while (at.z < values.hi.z) {
-    const bool slices = at.y == values.lo.y && sliceBytes <= stagingBytes;
-    filling().filled = (filling().filled + 3) / 4 * 4;
-    if (filling().filled + (slices ? sliceBytes : rowBytes) > stagingBytes) turnOver();
-    Half& half = filling();
-    half.staging.reserve(device_, stagingBytes, MemoryKind::Upload);
-    const std::uint64_t room = stagingBytes - half.filled;
-    const auto fitting = [room](int left, std::uint64_t each) {
-      return static_cast<int>(std::min<std::uint64_t>(static_cast<std::uint64_t>(left), room / each));
-    };
-    IndexBox box{at, {values.hi.x, values.hi.y, at.z + 1}};
-    if (slices) {
-      box.hi.z = at.z + fitting(values.hi.z - at.z, sliceBytes);
-    } else {
-      box.hi.y = at.y + fitting(values.hi.y - at.y, rowBytes);
-    }
-    writeBox(piece, box, half.staging.mapped().data() + half.filled);
-    half.commands.copyToImage(half.staging, half.filled, page, piece.place + glm::uvec3(at - piece.first),
-                              glm::uvec3(box.size()));
-    half.filled += box.count() * bytes;
-    at.y = box.hi.y;
-    if (at.y == values.hi.y) at = {values.lo.x, values.lo.y, box.hi.z};
-  }
-}
-
 void VolumeUpload::begin(const Commands& before) {
-  Half& half = filling();
-  half.commands.begin();
-  half.commands.waitFor(before);
-  half.filled = 0;
+  frame_.begin();
+  frame_.waitFor(before);
 }
 
 void VolumeUpload::run(std::span<const VolumePiece> pieces, std::span<const SampledImage> pages) {
   std::vector<Buffer> imported;
   const auto waitForAll = [&] {
-    for (Half& half : halves_) half.commands.wait();
+    for (const std::unique_ptr<Slot>& slot : slots_) {
+      slot->copies.wait();
+      slot->stores.wait();
+    }
+    frame_.wait();
   };
   try {
-    for (const SampledImage& page : pages) filling().commands.beginUpload(page);
-    std::vector<const VolumePiece*> direct;
+    for (const SampledImage& page : pages) places_ ? frame_.beginStores(page) : frame_.beginUpload(page);
+    Plan plan;
     for (const VolumePiece& piece : pieces) {
-      if (copyDirectly(piece, pages[piece.page], imported)) {
-        direct.push_back(&piece);
+      if (!places_ && copyDirectly(piece, pages[piece.page], imported)) {
+        // Patches overwrite the copied values.
+        for (const Patch& patch : piece.block->patchList()) {
+          const IndexBox part = patch.box.intersection(piece.box());
+          if (!part.empty()) plan.add(piece, part, places_);
+        }
       } else {
-        stage(piece, piece.box(), pages[piece.page]);
+        plan.add(piece, piece.box(), places_);
       }
     }
-    if (!direct.empty()) filling().commands.barrier();  // patches overwrite the copied values
-    for (const VolumePiece* piece : direct) {
-      for (const Patch& patch : piece->block->patchList()) {
-        const IndexBox part = patch.box.intersection(piece->box());
-        if (!part.empty()) stage(*piece, part, pages[piece->page]);
-      }
-    }
-    for (const SampledImage& page : pages) filling().commands.endUpload(page);
-    filling().commands.submit();
+    frame_.submit();
+    if (places_) bindPages(pages);
+    makeSlots(plan);
+    send(plan, pages);
+    frame_.begin();
+    for (const SampledImage& page : pages) places_ ? frame_.endStores(page) : frame_.endUpload(page);
+    frame_.submit();
     waitForAll();
   } catch (...) {
     waitForAll();  // no command may read memory that is about to be freed
     throw;
   }
+}
+
+void VolumeUpload::bindPages(std::span<const SampledImage> pages) {
+  std::array<const SampledImage*, shared::castMaxPages> images{};
+  for (std::size_t i = 0; i < images.size(); ++i) images[i] = &pages[std::min(i, pages.size() - 1)];
+  pipeline_ = &pipelines_.with({static_cast<std::uint32_t>(pages.size())});
+  pipeline_->bindStores(images);
+}
+
+/// Makes as many slots as the plan needs and memory allows.
+void VolumeUpload::makeSlots(const Plan& plan) {
+  std::uint64_t bytes = 0;
+  for (const Batch& batch : plan.batches) bytes = std::max(bytes, batch.end());
+  const std::size_t wanted = std::min(plan.batches.size(), maxSlots);
+  for (std::size_t i = 0; i < wanted; ++i) {
+    try {
+      if (i == slots_.size()) slots_.push_back(std::make_unique<Slot>(device_));
+      slots_[i]->staging.reserve(device_, bytes, MemoryKind::Upload);
+      if (places_) slots_[i]->values.reserve(device_, bytes, MemoryKind::DeviceLocal);
+    } catch (const Error& error) {
+      if (error.code() != ErrorCode::OutOfMemory || i == 0) throw;
+      slots_.resize(i);
+      return;
+    }
+  }
+}
+
+/// All threads fill the slots, and the one that completes a batch submits it.
+void VolumeUpload::send(const Plan& plan, std::span<const SampledImage> pages) {
+  const std::size_t count = plan.batches.size();
+  if (count == 0) return;
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<std::size_t> left(count);  // units to fill
+  for (const Plan::Unit& unit : plan.units) ++left[unit.batch];
+  std::vector<Submission> copied(count);
+  std::size_t submitted = 0;
+  bool failed = false;
+  // Waits until the slot's previous values are copied. Returns false after a failure.
+  const auto waitForSlot = [&](std::size_t batch) {
+    if (batch < slots_.size()) return true;
+    const std::size_t previous = batch - slots_.size();
+    std::unique_lock lock(mutex);
+    changed.wait(lock, [&] { return failed || submitted > previous; });
+    if (failed) return false;
+    const Submission submission = copied[previous];
+    lock.unlock();
+    device_->vulkan().wait(submission.kind, submission.number);
+    return true;
+  };
+  const auto finish = [&](std::size_t batch) {
+    const std::lock_guard lock(mutex);
+    --left[batch];
+    for (; !failed && submitted < count && left[submitted] == 0; ++submitted) {
+      Slot& slot = *slots_[submitted % slots_.size()];
+      submit(plan, plan.batches[submitted], slot, pages);
+      copied[submitted] = slot.copies.last();
+    }
+    changed.notify_all();
+  };
+  const auto work = [&](const Plan::Unit& unit) {
+    try {
+      if (!waitForSlot(unit.batch)) return;
+      const Load& load = plan.loads[unit.load];
+      std::byte* const to = slots_[unit.batch % slots_.size()]->staging.mapped().data();
+      const Tiling tiles = load.piece->block->tilesOf(load.box);
+      for (std::size_t tile = unit.first; tile < unit.last; ++tile) load.write(tiles[tile], to);
+      finish(unit.batch);
+    } catch (...) {
+      const std::lock_guard lock(mutex);
+      failed = true;
+      changed.notify_all();
+      throw;
+    }
+  };
+  eachInParallel(plan.units.size(), [&](std::size_t i) { work(plan.units[i]); });
+}
+
+void VolumeUpload::submit(const Plan& plan, const Batch& batch, Slot& slot,
+                          std::span<const SampledImage> pages) {
+  slot.copies.begin();
+  if (!places_) {
+    for (std::size_t i = batch.first; i < batch.last; ++i) {
+      const Load& load = plan.loads[i];
+      const VolumePiece& piece = *load.piece;
+      slot.copies.copyToImage(slot.staging, load.offset, pages[piece.page],
+                              piece.place + glm::uvec3(load.box.lo - piece.first),
+                              glm::uvec3(load.box.size()));
+    }
+    return slot.copies.submit();
+  }
+  std::uint64_t groups = 0;
+  auto* const jobs = reinterpret_cast<shared::PlaceJob*>(slot.staging.mapped().data() + batch.bytes);
+  for (std::size_t i = batch.first; i < batch.last; ++i) {
+    const Load& load = plan.loads[i];
+    const VolumePiece& piece = *load.piece;
+    shared::PlaceJob& job = jobs[i - batch.first];
+    job.values = slot.values.address() + load.offset;
+    job.scale = piece.values.scale;
+    job.offset = piece.values.offset;
+    job.size = glm::uvec3(load.box.size());
+    job.type = load.staged.type;
+    job.place = piece.place + glm::uvec3(load.box.lo - piece.first);
+    job.page = piece.page;
+    job.firstGroup = static_cast<std::uint32_t>(groups);
+    constexpr std::uint64_t share = shared::placeGroup * shared::placeEach;
+    groups += (load.box.count() + share - 1) / share;
+  }
+  slot.copies.waitFor(slot.stores);
+  slot.copies.copy(slot.staging, 0, slot.values, 0, batch.end());
+  slot.copies.submit();
+  const shared::PlaceConstants constants{slot.values.address() + batch.bytes,
+                                         static_cast<std::uint32_t>(batch.last - batch.first),
+                                         static_cast<std::uint32_t>(groups)};
+  slot.stores.begin();
+  slot.stores.waitFor(slot.copies);
+  slot.stores.dispatchMany(*pipeline_, constants, groups, 1);
+  slot.stores.submit();
 }
 
 }  // namespace vdi::gpu

@@ -24,6 +24,9 @@ VkDevice makeDevice(const DeviceCandidate& chosen) {
   const std::array queues{queueOf(chosen.computeFamily), queueOf(chosen.transferFamily)};
   DeviceFeatures features;
   features.core.features.shaderInt64 = VK_TRUE;
+  features.core.features.shaderFloat64 = chosen.limits.storesTexels ? VK_TRUE : VK_FALSE;
+  features.core.features.shaderStorageImageWriteWithoutFormat =
+      chosen.limits.storesTexels ? VK_TRUE : VK_FALSE;
   features.v11.storageBuffer16BitAccess = chosen.limits.storage16Bit ? VK_TRUE : VK_FALSE;
   features.v12.storageBuffer8BitAccess = chosen.limits.storage8Bit ? VK_TRUE : VK_FALSE;
   features.v12.shaderFloat16 = chosen.limits.shaderFloat16 ? VK_TRUE : VK_FALSE;
