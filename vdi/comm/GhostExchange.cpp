@@ -123,6 +123,7 @@ struct Wanted {
   IndexBox box;
   bool keep = false;                    // the caller's ghost values, which stay if no block has better ones
   std::vector<IndexBox> asked;          // parts that other blocks have; they may overlap
+  std::vector<std::size_t> questions;   // about them, among those to this rank itself
   std::vector<IndexBox> edges;          // parts that blocks store, but at edges of their ghost layers only
   std::size_t copies = 0;               // number of values to copy
   std::shared_ptr<std::byte[]> values;  // values of the block's type
@@ -133,6 +134,7 @@ struct Wanted {
 /// Values that one block or several blocks of this rank share.
 struct Grid {
   Block block;
+  std::shared_ptr<const Block> stored;  // its stored values alone
   bool cells = false;
   double volume = 0.0;  // volume that a single value represents
   IndexBox core;        // bounds of the stored values without ghost layers
@@ -223,13 +225,16 @@ class LayerExchange {
       findWanted(grids_[i]);
       for (std::size_t w = 0; w < grids_[i].wanted.size(); ++w) askFor(i, w);
     }
+    for (Grid& grid : grids_) grid.stored = storedOnly(grid.block);
     for (std::size_t i = 0; i < grids_.size(); ++i) {
       makePatches(i);
       noteOwnValues(grids_[i]);
     }
     rounds_.resize(levels_.size() + firstCoarserRound);
     for (const auto& asked : outgoing_) {
-      for (const Asked& one : asked) rounds_[static_cast<std::size_t>(one.question.round)] = 1;
+      for (const Asked& one : asked) {
+        if (one.question.round != noRound) rounds_[static_cast<std::size_t>(one.question.round)] = 1;
+      }
     }
   }
 
@@ -259,6 +264,7 @@ class LayerExchange {
   /// The first round answers with values that coincide with a donor's own. The second one interpolates in
   /// donors of the asking level or finer ones, and later rounds interpolate in coarser ones, the coarsest
   /// first. Thus each round finds the layers that it needs.
+  static constexpr std::int32_t noRound = -1;  // needs no answer
   static constexpr std::int32_t exactRound = 0;
   static constexpr std::int32_t interpolatedRound = 1;
   static constexpr std::int32_t firstCoarserRound = 2;
@@ -488,8 +494,39 @@ class LayerExchange {
       wanted.sums.assign(wanted.box.count(), 0.0);
       wanted.weights.assign(wanted.box.count(), 0.0);
     }
+    if (donor.rank == comm_.rank()) wanted.questions.push_back(mine().size());
     outgoing_[static_cast<std::size_t>(donor.rank)].push_back(
         {request, static_cast<std::int32_t>(gridIndex), static_cast<std::int32_t>(wantedIndex)});
+  }
+
+  /// This rank's questions to itself.
+  std::vector<Asked>& mine() { return outgoing_[static_cast<std::size_t>(comm_.rank())]; }
+
+  static std::shared_ptr<const Block> storedOnly(const Block& block) {
+    Block stored = block;
+    stored.extra = {};
+    stored.patches = nullptr;
+    return std::make_shared<const Block>(std::move(stored));
+  }
+
+  /// Adds the patches of values that other blocks of this rank have, which then need no memory and no
+  /// answers. Returns false unless the box, all of `wanted` that is needed, consists of such values alone.
+  bool takeWhereTheyLie(const Wanted& wanted, const IndexBox& box, std::vector<Patch>& patches) {
+    if (wanted.questions.size() != wanted.asked.size() || !wanted.sums.empty() ||
+        wanted.copies != box.count())
+      return false;
+    // Faces may make boxes overlap by a rounding error, where the last answer counts.
+    for (std::size_t i = 0; i < wanted.asked.size(); ++i) {
+      for (std::size_t j = 0; j < i; ++j)
+        if (!wanted.asked[i].intersection(wanted.asked[j]).empty()) return false;
+    }
+    for (const std::size_t index : wanted.questions) {
+      Question& question = mine()[index].question;
+      patches.push_back(
+          {question.box, nullptr, grids_[static_cast<std::size_t>(question.grid)].stored, question.shift});
+      question.round = noRound;
+    }
+    return true;
   }
 
   /// Whether all samples lie at the donor's values.
@@ -526,6 +563,7 @@ class LayerExchange {
       if (wanted.keep && wanted.asked.empty()) continue;
       const IndexBox box = wanted.box.intersection(all);
       if (box.empty()) continue;
+      if (takeWhereTheyLie(wanted, box, *patches)) continue;
       wanted.values = std::shared_ptr<std::byte[]>(new std::byte[box.count() * sizeOf(grid.block.type)]);
       if (box != wanted.box) {
         wanted.box = box;

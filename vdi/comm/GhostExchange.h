@@ -22,8 +22,9 @@ std::vector<Block> settleOwnership(const Communicator& comm, std::vector<Block> 
 
 /// Collective. Calls settleOwnership, then adds neighbours' values: all that interpolation uses up to
 /// valueReach beyond the owned boxes, edges and corners included. That is one layer of points, or two of
-/// cells. Values arrive as `extra` layers and `patches` of the blocks; stored ones are not copied. Existing
-/// extra layers and patches are dropped.
+/// cells. Values arrive as `extra` layers and `patches` of the blocks; stored ones are not copied. Where all
+/// values of a layer are copies from blocks of this rank, the patches name these blocks, and their data must
+/// stay as long as the patches are read. Existing extra layers and patches are dropped.
 ///
 /// Gaps. Blocks of point data that are at most one spacing apart first close the gap. The coarser block owns
 /// it, or the lower one of two of the same level.

@@ -53,13 +53,22 @@ void LocalValues::gather(const Block& block, const Indices& indices) {
   } else {
     takeCopies(block, indices);
   }
-  for (const Patch& patch : block.patchList()) takeArray(patch.box, patch.values.get());
+  for (const Patch& patch : block.patchList())
+    patch.values ? takeArray(patch.box, patch.values.get()) : takeDonors(block.type, patch, indices);
 }
 
 void LocalValues::takeCopies(const Block& block, const Indices& indices) {
   row_.resize(static_cast<std::size_t>(block.dims.x));
   take(block.type, block.stored(), indices, [&](const glm::ivec3& at, int end) -> const void* {
     block.copyTo({at, {end, at.y + 1, at.z + 1}}, row_.data());
+    return row_.data();
+  });
+}
+
+void LocalValues::takeDonors(ScalarType type, const Patch& patch, const Indices& indices) {
+  row_.resize(static_cast<std::size_t>(patch.box.size().x));
+  take(type, patch.box, indices, [&](const glm::ivec3& at, int end) -> const void* {
+    patch.donor->copyTo({at + patch.shift, glm::ivec3(end, at.y + 1, at.z + 1) + patch.shift}, row_.data());
     return row_.data();
   });
 }

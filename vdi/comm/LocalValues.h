@@ -30,9 +30,10 @@ class LocalValues {
   template <typename RowAt>
   void take(ScalarType type, const IndexBox& box, const Indices& indices, RowAt rowAt);
   void takeCopies(const Block& block, const Indices& indices);
+  void takeDonors(ScalarType type, const Patch& patch, const Indices& indices);
 
   std::vector<double> values_;
-  std::vector<double> row_;  // memory for stored values that aren't an array
+  std::vector<double> row_;  // memory for values that aren't an array
   Indices range_;
 };
 
