@@ -49,15 +49,28 @@ ValuesKey keyOf(const Block& block) {
 struct SharedValues {
   std::vector<IndexBox> own;  // own values of any of these blocks
   const OwnValues* last = nullptr;
+  const Block* block = nullptr;  // the first of them
+  std::vector<VolumePiece> cut;
   std::optional<PieceRange> pieces;
 
-  void addOwn(const Block& block) {
-    if (block.ownValues && block.ownValues.get() == last) return;
-    last = block.ownValues.get();
-    const std::vector<IndexBox> boxes = block.ownBoxes();
+  void addOwn(const Block& of) {
+    if (block == nullptr) block = &of;
+    if (of.ownValues && of.ownValues.get() == last) return;
+    last = of.ownValues.get();
+    const std::vector<IndexBox> boxes = of.ownBoxes();
     own.insert(own.end(), boxes.begin(), boxes.end());
   }
 };
+
+/// Cuts the blocks, which may take a pass over their values for ranges. Threads share blocks if there are
+/// enough of them, and else each block's values.
+void cutAll(const Device& device, std::map<ValuesKey, SharedValues>& known) {
+  std::vector<SharedValues*> all;
+  for (auto& [key, values] : known) all.push_back(&values);
+  const auto cut = [&](std::size_t i) { all[i]->cut = cutToPieces(device, *all[i]->block, all[i]->own); };
+  if (all.size() >= usableCores()) return eachInParallel(all.size(), cut);
+  for (std::size_t i = 0; i < all.size(); ++i) cut(i);
+}
 
 /// Adds the boxes of a piece's own texels, and notes their places in the piece.
 void addOwnTexels(std::vector<shared::TexelBox>& texels, VolumePiece& piece, std::span<const IndexBox> own) {
@@ -154,6 +167,7 @@ void VolumeStore::lay(Step& step, std::span<const Block> blocks, const Scene& sc
   for (const Block& block : step.blocks) {
     if (!block.owned.empty()) known[keyOf(block)].addOwn(block);
   }
+  cutAll(*device_, known);
   step.ownTexels.clear();
   for (const Block& block : step.blocks) {
     if (block.owned.empty()) {
@@ -163,7 +177,7 @@ void VolumeStore::lay(Step& step, std::span<const Block> blocks, const Scene& sc
     SharedValues& values = known[keyOf(block)];
     if (!values.pieces) {
       const auto first = static_cast<std::uint32_t>(pieces.size());
-      for (VolumePiece& piece : cutToPieces(*device_, block, values.own)) {
+      for (VolumePiece& piece : values.cut) {
         addOwnTexels(step.ownTexels, piece, values.own);
         pieces.push_back(piece);
       }
