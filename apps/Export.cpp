@@ -47,8 +47,7 @@ void exportPage(const ExportOptions& options) {
 }  // namespace
 
 void addExport(CLI::App& app, Job& job) {
-  CLI::App* command =
-      app.add_subcommand("export", "Write a page, in one file, that shows VDIs in a browser");
+  CLI::App* command = app.add_subcommand("export", "Write a page, in one file, that shows VDIs in a browser");
   command->footer(
       "Example:\n"
       "  vdi export coil.vdi -o coil.html\n"

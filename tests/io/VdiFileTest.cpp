@@ -294,8 +294,8 @@ TEST_CASE(
     REQUIRE(found != std::string::npos);
     return text.replace(found, from.size(), to);
   };
-  refused("", "parse error");
-  refused("{", "parse error");
+  refused("", "it ends too early");
+  refused("{", "it ends too early");
   refused("[]", "not a JSON object");
   refused("{" + array + "}", "'transferFunction' is missing");
   refused(std::string(10000, '['), "it ends too early");
