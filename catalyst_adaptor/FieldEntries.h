@@ -35,7 +35,6 @@ struct FieldEntries {
   }
   static int setArrayMissing(Handle* handle, const char* name, std::int32_t association, std::int32_t count,
                              const double* values) {
-    if (!usable(handle)) return VDI_CATALYST_BAD_ARGUMENT;
     [[maybe_unused]] const Lock lock;
     return catalyst::setArrayMissing(*handle, name, association, count, values);
   }

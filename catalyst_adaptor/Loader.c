@@ -371,7 +371,7 @@ int vdi_catalyst_set_array_strided(vdi_catalyst* catalyst, const char* name, int
 
 int vdi_catalyst_set_array_missing(vdi_catalyst* catalyst, const char* name, int32_t association,
                                    int32_t count, const double* values) {
-  RETURN_CALL(int, VDI_CATALYST_BAD_ARGUMENT, set_array_missing(catalyst, name, association, count, values));
+  RETURN_CALL(int, refusal, set_array_missing(catalyst, name, association, count, values));
 }
 
 int vdi_catalyst_set_array_offset(vdi_catalyst* catalyst, const char* name, int32_t association,

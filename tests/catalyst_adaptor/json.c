@@ -100,6 +100,7 @@ static void* intrude(void* unused) {
       vdi_catalyst_set_array(entered, "V", VDI_CATALYST_F64, VDI_CATALYST_CELLS, data),
       vdi_catalyst_set_array_strided(entered, "V", VDI_CATALYST_F64, VDI_CATALYST_CELLS, 1, data, &strides),
       vdi_catalyst_set_array_offset(entered, "V", VDI_CATALYST_CELLS, offset),
+      vdi_catalyst_set_array_missing(entered, "V", VDI_CATALYST_CELLS, 1, offset),
       vdi_catalyst_set_particles(entered, "P", &none),
       vdi_catalyst_execute(entered, 0, 0.0),
       vdi_catalyst_finalize(entered)};
