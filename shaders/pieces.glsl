@@ -20,14 +20,21 @@ vec4 inPiece(SlabPiece piece, float position) {
   return mix(piece.front, piece.back, share);
 }
 
+// The piece at the back of the last slab: most slabs lie in one piece, and in that of the slab before.
+uint lastPiece = 0u;
+
 // The mean of associated colour and extinction between two positions.
 vec4 meanEntry(float front, float back) {
   float low = min(front, back);
   float high = max(front, back);
+  SlabPiece before = params.pieces.at[lastPiece];
+  if (low >= before.start && high < before.end) return inPiece(before, 0.5 * (low + high));
   uint first = pieceAt(low);
+  lastPiece = first;
   SlabPiece begin = params.pieces.at[first];
   if (high < begin.end) return inPiece(begin, 0.5 * (low + high));
   uint last = pieceAt(high);
+  lastPiece = front < back ? last : first;
   SlabPiece behind = params.pieces.at[min(first + 1u, last)];
   SlabPiece end = params.pieces.at[last];
   if (first == last) return inPiece(begin, 0.5 * (low + high));

@@ -99,7 +99,8 @@ std::string changed(std::string bytes, Noise& noise) {
 
 Controls controls() {
   Controls result;
-  result.generator = GeneratorControls{{640, 360}, 25, std::array{0.0, 0.5}, {"X Ray", "Cool to Warm"}, 0.0};
+  result.generator =
+      GeneratorControls{{640, 360}, 25, std::array{0.0, 0.5}, {"X Ray", "Cool to Warm"}, 0.0, {}};
   result.parameters = {{"feed", false, 0.03, 0.0, 0.1}, {"steps", true, 3.0, 1.0, 9.0}};
   return result;
 }

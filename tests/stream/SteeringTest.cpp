@@ -16,7 +16,7 @@ constexpr char token[] = "a-token-of-this-test-0123456789";
 
 Controls controls() {
   Controls result;
-  result.generator = GeneratorControls{{640, 360}, 25, std::array{0.0, 0.5}, {"Viridis", "X Ray"}, 0.0};
+  result.generator = GeneratorControls{{640, 360}, 25, std::array{0.0, 0.5}, {"Viridis", "X Ray"}, 0.0, {}};
   result.parameters = {{"feed", false, 0.037, 0.0, 0.1}, {"seeds", true, 3.0, 1.0, 9.0}};
   return result;
 }

@@ -270,7 +270,7 @@ void converse(const std::vector<std::string>& said, const stream::Controls& cont
 /// Holds conversations in which `count` consecutive allocations fail. Returns their number.
 int converseWithoutMemory(std::int64_t count) {
   stream::Controls controls;
-  controls.generator = stream::GeneratorControls{{0, 360}, 25, std::array{0.0, 0.5}, {"Viridis"}, 0.5};
+  controls.generator = stream::GeneratorControls{{0, 360}, 25, std::array{0.0, 0.5}, {"Viridis"}, 0.5, {}};
   controls.parameters = {{"feed", false, 0.037, 0.0, 0.1}};
   stream::Wish wish;
   wish.camera.emplace();

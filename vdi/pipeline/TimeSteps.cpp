@@ -33,23 +33,28 @@ void requireUsableValues(const comm::Communicator& comm, std::span<const Block> 
                   limitsOf(ScalarType::F32).minimum, limitsOf(ScalarType::F64).minimum));
 }
 
-/// Collective: makes a sheet of values, which has no volume, one spacing thick.
+/// Collective: makes a sheet of values, which has no volume, one spacing thick. A block with several layers
+/// that owns no volume is no sheet: it gives all of its places to others.
 void thickenSheet(const comm::Communicator& comm, std::span<Block> blocks) {
   const glm::dvec3 none(std::numeric_limits<double>::infinity());
   Box bounds{none, -none};
   glm::dvec3 finest = none;
+  glm::ivec3 most(0);  // layers across each axis
   for (const Block& block : blocks) {
     if (glm::any(glm::greaterThan(block.owned.lo, block.owned.hi))) continue;
     bounds = {glm::min(bounds.lo, block.owned.lo), glm::max(bounds.hi, block.owned.hi)};
     finest = glm::min(finest, block.spacing);
+    most = glm::max(most, block.dims);
   }
-  std::array<double, 9> least{bounds.lo.x,  bounds.lo.y, bounds.lo.z, -bounds.hi.x, -bounds.hi.y,
-                              -bounds.hi.z, finest.x,    finest.y,    finest.z};
+  const glm::dvec3 layers = -glm::dvec3(most);
+  std::array<double, 12> least{bounds.lo.x,  bounds.lo.y,  bounds.lo.z, -bounds.hi.x,
+                               -bounds.hi.y, -bounds.hi.z, finest.x,    finest.y,
+                               finest.z,     layers.x,     layers.y,    layers.z};
   comm.allReduceMin(least);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double thickness = -least[axis + 3] - least[axis];
     constexpr double rounding = 1e-3;  // share of a spacing by which ranks may differ in a sheet's place
-    if (!(thickness >= 0.0 && thickness < rounding * least[axis + 6])) continue;
+    if (!(thickness >= 0.0 && thickness < rounding * least[axis + 6]) || least[axis + 9] < -1.0) continue;
     const auto a = static_cast<int>(axis);
     for (Block& block : blocks) {
       if (glm::any(glm::greaterThan(block.owned.lo, block.owned.hi))) continue;

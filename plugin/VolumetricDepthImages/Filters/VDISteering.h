@@ -2,6 +2,8 @@
 #ifndef VDISteering_h
 #define VDISteering_h
 
+#include <string>
+
 class vtkSMProxy;
 class vtkSMSourceProxy;
 class vtkSMExtractsController;
