@@ -219,8 +219,7 @@ void addServe(CLI::App& app, Job& job) {
                                             "serve one viewer at standard input and output instead of a port")
                                  ->excludes(from);
   for (const char* const name :
-       {"--host", "--port", "--token-file", "--certificate", "--key", "--origin", "--embed-in",
-        "--title"})
+       {"--host", "--port", "--token-file", "--certificate", "--key", "--origin", "--embed-in", "--title"})
     stdio->excludes(command->get_option(name));
   command->callback([options, &job] {
     if (options->inputs.empty() && options->from.empty())

@@ -1,21 +1,15 @@
 // Parameters of cast.comp: ray casting the blocks of a rank.
 #ifndef VDI_SHARED_CAST_H
 #define VDI_SHARED_CAST_H
-#include "cells.h"
 #include "lists.h"
+#include "cells.h"
 #include "slab.h"
 #include "volume.h"
 
 #ifndef __cplusplus
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer BrickArray {
-  Brick at[];
-};
-layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer KdNodeArray {
-  KdNode at[];
-};
-layout(buffer_reference, scalar, buffer_reference_align = 8) buffer UintPairArray {
-  uvec2 at[];
-};
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer BrickArray { Brick at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer KdNodeArray { KdNode at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer UintPairArray { uvec2 at[]; };
 #endif
 
 VDI_SHARED_BEGIN
@@ -39,13 +33,13 @@ VDI_CONST uint blendMinimum = 2;
 VDI_CONST uint blendIsosurface = 3;
 // A difference smaller than this share of two values counts as rounding error (core/Shading.h).
 VDI_CONST float leastGradient = 1.0e-6f;
-VDI_CONST uint castModeSearch = 0;  // sensitivities and counts
-VDI_CONST uint castModeWrite = 1;   // supersegments
+VDI_CONST uint castModeSearch = 0;          // sensitivities and counts
+VDI_CONST uint castModeWrite = 1;           // supersegments
 
 struct CastParams {
   VDI_ADDRESS(BrickArray) bricks;
-  VDI_ADDRESS(KdNodeArray) nodes;  // node 0 is the root
-  VDI_ADDRESS(CellArray) cells;    // macrocells: 1 if something in it is visible
+  VDI_ADDRESS(KdNodeArray) nodes;            // node 0 is the root
+  VDI_ADDRESS(CellArray) cells;              // macrocells: 1 if something in it is visible
   // [h][w]; merging: tolerances; while counting, of the counted lists
   VDI_ADDRESS(FloatArray) thresholds;
   // [h][w]; merging: room for pre-segments; while counting, their number in the counted lists

@@ -49,7 +49,8 @@ const std::vector<FromViewer>& viewerMessages() {
 
 Controls everyControl() {
   Controls controls;
-  controls.generator = GeneratorControls{{0, 360}, 1024, std::array{-1.0, 1e300}, {"Viridis", "X Ray"}, 64.0, "X Ray"};
+  controls.generator =
+      GeneratorControls{{0, 360}, 1024, std::array{-1.0, 1e300}, {"Viridis", "X Ray"}, 64.0, "X Ray"};
   controls.period = 7;
   controls.paused = true;
   controls.parameters = {{"feed", false, 0.037, 0.0, 0.1}, {"seeds_0.x-y", true, 3.0, -1.0, 1e15}};

@@ -81,8 +81,7 @@ ComputePipeline& CastPass::pipelineFor(const Program& program) {
       {program.program, static_cast<std::uint32_t>(pageCount), program.encoding, program.samplesAhead,
        program.lanesPerRay, program.cutAtGaps ? 1U : 0U, program.byNeed ? 1U : 0U,
        volume_->mayBeInfinite() ? 1U : 0U, volume_->reachesBeyondTable() ? 1U : 0U, program.shaded ? 1U : 0U,
-       program.blendMode, program.takesNearest ? 1U : 0U,
-        program.hasPieces ? 1U : 0U});
+       program.blendMode, program.takesNearest ? 1U : 0U, program.hasPieces ? 1U : 0U});
   const Bound now{volume_->pagesVersion(), volume_->slabsVersion()};
   Bound& bound = bound_[&pipeline];
   if (bound != now) {
@@ -119,10 +118,10 @@ void CastPass::record(Commands& commands, const shared::CastParams& params, Work
   pipelines_.update(commands, params);
   // Counted samples may not be adjacent, so none are requested ahead.
   const std::uint32_t ahead = stride > 1 ? 1 : samplesAhead_;
-  commands.dispatch(pipelineFor({program, encoding, lanes, ahead, band.cutAtGaps, params.level >= 0.0F,
-                                 params.shaded != 0, params.blendMode, params.takesNearest != 0,
-                                 params.pieceCount > 0}),
-                    constants, groupsFor(width, shared::castGroupX), groupsFor(rows, shared::castGroupY));
+  commands.dispatch(
+      pipelineFor({program, encoding, lanes, ahead, band.cutAtGaps, params.level >= 0.0F, params.shaded != 0,
+                   params.blendMode, params.takesNearest != 0, params.pieceCount > 0}),
+      constants, groupsFor(width, shared::castGroupX), groupsFor(rows, shared::castGroupY));
 }
 
 }  // namespace vdi::gpu

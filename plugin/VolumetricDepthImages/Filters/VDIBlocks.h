@@ -15,9 +15,9 @@ namespace pv {
 /// The scalars of a data set that a VDI shows.
 struct ArrayChoice {
   std::string name;
-  bool cells = false;    // an array of cells, else of points
-  int component = 0;     // or vdi::magnitude, or vdi::phase
-  bool nearest = false;  // vdi::Block::nearest
+  bool cells = false;             // an array of cells, else of points
+  int component = 0;              // or vdi::magnitude, or vdi::phase
+  bool nearest = false;           // vdi::Block::nearest
   std::vector<double> missing{};  // numbers that stand for missing values, beside those of a StridedSource
   bool operator==(const ArrayChoice&) const = default;
 };
