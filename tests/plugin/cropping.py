@@ -113,7 +113,16 @@ for mode in ("Slice", "Composite"):
     check(len(about) == (0 if mode == "Composite" else 1), "%s: %d messages that it isn't supported" % (mode, len(about)))
 for name, usual, value, words in (("UseSeparateOpacityArray", 0, 1, "Separate Opacity Array"),
                                   ("UseTransfer2D", 0, 1, "2D Transfer Function"),
+                                  ("MapScalars", 1, 0, "Map Scalars"),
+                                  ("MultiComponentsMapping", 0, 1, "Multi Components Mapping"),
+                                  ("VolumetricScatteringBlending", 0, 1, "Volumetric Scattering"),
+                                  ("VolumeAnisotropy", 0, 0.5, "Anisotropy"),
+                                  ("GlobalIlluminationReach", 0, 0.5, "Global Illumination Reach"),
+                                  ("InterpolationType", "Linear", "Cubic", "Interpolation Type"),
                                   ("Scale", [1, 1, 1], [1, 1, 2], "Transforming")):
+    if name not in representation.ListProperties() or value == "Cubic" and "Cubic" not in \
+            representation.GetProperty(name).Available:
+        continue  # not in this version of ParaView
     setattr(representation, name, value)
     with Messages("WarningEvent") as said:
         vdi_filter(source, view, "CELLS", "field", 2.0, Resolution=[0, 0]).UpdatePipeline()

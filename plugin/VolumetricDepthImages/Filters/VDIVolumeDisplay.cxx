@@ -246,10 +246,29 @@ std::string displayIssues(vtkSMProxy* shown) {
     add("The view takes this volume's opacity from another array (its Use Separate Opacity Array). "
         "VolumetricDepthImage uses the array that it shows instead.");
   }
+  const auto isAnyChanged = [shown](std::initializer_list<const char*> names) {
+    return std::any_of(names.begin(), names.end(),
+                       [shown](const char* name) { return isChanged(shown, name); });
+  };
+  if (isChanged(shown, "MapScalars") || isOn(shown, "MultiComponentsMapping")) {
+    add("The view takes this volume's colours from the components of its array (its Map Scalars, or its "
+        "Multi "
+        "Components Mapping). VolumetricDepthImage maps the one component that it shows.");
+  }
+  if (isAnyChanged({"VolumetricScatteringBlending", "VolumeAnisotropy", "GlobalIlluminationReach"})) {
+    add("The view scatters light in this volume (its Volumetric Scattering, its Anisotropy or its Global "
+        "Illumination Reach), but VolumetricDepthImage shows emission and absorption only.");
+  }
+  if (isOn(shown, "Shade") && isChanged(shown, "Specular")) {
+    add("The view shows highlights (its Specular), but VolumetricDepthImage shades without them.");
+  }
+  if (vtkSMProperty* interpolation = shown->GetProperty("InterpolationType");
+      interpolation != nullptr && vtkSMPropertyHelper(interpolation).GetAsInt() > 1) {
+    add("The view interpolates this volume by cubic polynomials (its Interpolation Type), but "
+        "VolumetricDepthImage does it linearly.");
+  }
   // ParaView 5.13 has renamed Position to Translation.
-  constexpr std::array transforming{"Position", "Translation", "Scale", "Orientation"};
-  if (std::any_of(transforming.begin(), transforming.end(),
-                  [shown](const char* name) { return isChanged(shown, name); })) {
+  if (isAnyChanged({"Position", "Translation", "Scale", "Orientation"})) {
     add("The view moves, scales or turns this volume (its Transforming), but VolumetricDepthImage shows it "
         "where its data are.");
   }
