@@ -54,6 +54,7 @@ TEST_CASE("fingerprints name the parameter that differs") {
       {"budget", [](Parameters& p) { p.settings.budget = Budget::Total; }},
       {"fill", [](Parameters& p) { p.settings.fill = 0.5; }},
       {"sampling rate", [](Parameters& p) { p.settings.samplesPerVoxel = 2.0; }},
+      {"interpolation", [](Parameters& p) { p.settings.interpolation = Interpolation::Nearest; }},
       {"algorithm", [](Parameters& p) { p.settings.algorithm = Algorithm::Bisection; }},
       {"precision", [](Parameters& p) { p.settings.precision = Precision::Full; }},
       {"termination opacity", [](Parameters& p) { p.settings.terminationOpacity = 0.5; }},

@@ -169,7 +169,9 @@ TEST_CASE("shaded, also nearest: the picture and VDI of N ranks are those of one
       if (!root) continue;
       const auto truth = one.renderVolume(camera, function, settings);
       REQUIRE(anythingSeen(*truth));
-      CHECK(test::largestDifference(*volume, *truth) < 1.0F);
+      // Nearest samples are cut at voxels' faces, whose places blocks round differently.
+      const float bound = interpolation == Interpolation::Nearest ? 1.5F : 1.0F;
+      CHECK(test::largestDifference(*volume, *truth) < bound);
       const auto alone = one.generate(camera, function, settings);
       // Colours clipped at 1 are rounded once more on each side.
       CHECK(test::largestDifference(flatten(*vdi), flatten(*alone)) < (diffuse < 1.0 ? 2.0F : 2.5F));

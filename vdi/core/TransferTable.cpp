@@ -137,8 +137,7 @@ std::vector<Stretch> stretchesOf(const TransferFunction& function) {
   for (const ColorNode& node : function.colors) xs.push_back(node.x);
   for (const OpacityNode& node : function.opacities) xs.push_back(node.x);
   std::ranges::sort(xs);
-  const auto repeated = std::ranges::unique(xs);
-  xs.erase(repeated.begin(), repeated.end());
+  xs.erase(std::unique(xs.begin(), xs.end()), xs.end());
   const auto colorOf = [](const ColorNode& node) { return node.color; };
   const auto opacityOf = [](const OpacityNode& node) { return node.opacity; };
   // An error of 0.002 of the extinction is at most 0.0008 of opacity. Functions with very many nodes get

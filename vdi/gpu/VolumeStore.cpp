@@ -66,6 +66,7 @@ struct SharedValues {
 /// enough of them, and else each block's values.
 void cutAll(const Device& device, std::map<ValuesKey, SharedValues>& known) {
   std::vector<SharedValues*> all;
+  all.reserve(known.size());
   for (auto& [key, values] : known) all.push_back(&values);
   const auto cut = [&](std::size_t i) { all[i]->cut = cutToPieces(device, *all[i]->block, all[i]->own); };
   if (all.size() >= usableCores()) return eachInParallel(all.size(), cut);

@@ -488,7 +488,7 @@ void VolumeUpload::submit(const Plan& plan, const Batch& batch, Slot& slot,
     job.place = piece.place + glm::uvec3(load.box.lo - piece.first);
     job.page = piece.page;
     job.firstGroup = static_cast<std::uint32_t>(groups);
-    constexpr std::uint64_t share = shared::placeGroup * shared::placeEach;
+    constexpr std::uint64_t share = std::uint64_t{shared::placeGroup} * shared::placeEach;
     groups += (load.box.count() + share - 1) / share;
   }
   slot.copies.waitFor(slot.stores);
