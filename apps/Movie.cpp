@@ -70,6 +70,7 @@ Movie::Movie(std::filesystem::path path, int width, int height, double rate)
     fail(std::string("can't make a pipe: ") + std::strerror(errno), path_);
   std::vector<std::string> words = wordsOf(part_, width, height, rate);
   std::vector<char*> arguments;
+  arguments.reserve(words.size() + 1);
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t actions{};

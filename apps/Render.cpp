@@ -51,6 +51,7 @@ struct Shot {
 std::vector<Shot> shotsOf(const RenderOptions& options) {
   constexpr double turn = 360.0;
   std::vector<Shot> shots;
+  shots.reserve(static_cast<std::size_t>(std::max(options.orbit, 0)));
   for (int i = 0; i < options.orbit; ++i) {
     shots.push_back({options.azimuths.front() + turn * i / options.orbit,
                      options.output.empty() ? "" : withSuffix(options.output, fmt::format("{:04}", i))});

@@ -187,7 +187,7 @@ export class Page {
     const {width, height} = element("view").getBoundingClientRect();
     const boxes = PANELS.map((id) => element(id).getBoundingClientRect());
     const [bar, legend, header] = boxes.map((box) => box.width > 0 && box.height > 0 ? box : undefined);
-    const bottom = bar ? height - bar.top : 0, right = legend ? width - legend.left : 0, top = header ? header.bottom : 0;
+    const bottom = bar ? Math.max(height - bar.top, 0) : 0, right = legend ? width - legend.left : 0, top = header ? header.bottom : 0;
     const frames = [[0, 0], [0, right], [top, 0], [top, right]]
       .map(([above, beside]) => ({x: 0, y: bottom, width: width - beside, height: height - above - bottom}))
       .filter((frame) => frame.width >= LEAST_FRAME[0] && frame.height >= LEAST_FRAME[1]);

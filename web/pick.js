@@ -27,7 +27,8 @@ export function pointAt(viewer, x, y) {
   const row = Math.min(Math.max(Math.floor((1 - y) * canvas.height), 0), canvas.height - 1);
   const {right, up, forward} = basisOf(camera);
   const pixel = 2 * halfHeightOf(camera) / renderer.framedHeight();
-  const [u, v] = [(column + 0.5 - canvas.width / 2) * pixel, (row + 0.5 - canvas.height / 2) * pixel];
+  const [beside, above] = renderer.framedMiddle();
+  const u = (column + 0.5 - canvas.width / 2 - beside) * pixel, v = (row + 0.5 - canvas.height / 2 - above) * pixel;
   const across = plus(times(u, right), times(v, up));
   const at = (/** @type {number} */ depth) => camera.parallel
     ? plus(plus(camera.position, across), times(depth, forward))

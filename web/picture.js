@@ -22,13 +22,16 @@ export function pictureOf(viewer, size, isTransparent = false) {
   const {renderer, canvas, camera} = viewer;
   if (!camera) return Promise.reject(new Error("there is no picture yet"));
   if (viewer.isLost) return Promise.reject(new Error("the graphics driver has lost the picture"));
-  const former = [canvas.width, canvas.height];
+  const former = [canvas.width, canvas.height], {framing} = renderer;
   const [width, height] = size ?? former;
   const [mostWidth, mostHeight] = renderer.most;
   if (width > mostWidth || height > mostHeight)
     return Promise.reject(new Error(`this GPU draws pictures of at most ${mostWidth} × ${mostHeight} pixels`));
   const isOther = width !== former[0] || height !== former[1];
-  if (isOther) [canvas.width, canvas.height] = [width, height];
+  if (isOther) {
+    [canvas.width, canvas.height] = [width, height];
+    renderer.framing = undefined;  // no panels cover such a picture
+  }
   const rows = Math.max(1, Math.floor(STRIP_PIXELS / width));
   for (let row = 0; row < height; row += rows)
     renderer.drawPicture(camera, 1, row, Math.min(row + rows, height), renderer.canShear());
@@ -47,6 +50,7 @@ export function pictureOf(viewer, size, isTransparent = false) {
   viewer.onPicture(isOther);
   if (isOther) {
     [canvas.width, canvas.height] = former;
+    renderer.framing = framing;
     viewer.redraw();
   }
   return png;

@@ -69,7 +69,7 @@ export function canRecord() {
 }
 
 export class Recorder {
-  /** @param {HTMLCanvasElement} canvas @param {() => void} onChange called when it starts or stops */
+  /** @param {() => HTMLCanvasElement} canvas on show @param {() => void} onChange called when it starts or stops */
   constructor(canvas, onChange) {
     this.canvas = canvas;
     this.onChange = onChange;
@@ -84,7 +84,7 @@ export class Recorder {
   /** Throws Error if the browser can't record. */
   start() {
     const mimeType = FORMATS.find((format) => MediaRecorder.isTypeSupported(format));
-    const recorder = new MediaRecorder(this.canvas.captureStream(FRAMES_PER_SECOND), {mimeType, videoBitsPerSecond: BITS_PER_SECOND});
+    const recorder = new MediaRecorder(this.canvas().captureStream(FRAMES_PER_SECOND), {mimeType, videoBitsPerSecond: BITS_PER_SECOND});
     /** @type {Blob[]} */
     const parts = [];
     recorder.addEventListener("dataavailable", ({data}) => parts.push(data));

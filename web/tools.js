@@ -58,7 +58,7 @@ function onDoubleTap(element, act) {
 /** @param {Tooled} page */
 export function addTools(page) {
   const {viewer} = page;
-  const {canvas} = viewer;
+  const view = toolOf("view");
 
   /**
    * Moves the view there in a third of a second.
@@ -98,7 +98,7 @@ export function addTools(page) {
    * @param {number} y
    */
   const orbitPlace = (x, y) => {
-    const box = canvas.getBoundingClientRect();
+    const box = view.getBoundingClientRect();
     const point = pointAt(viewer, (x - box.left) / box.width, (y - box.top) / box.height);
     if (!point) return;
     page.orbit(point);
@@ -107,7 +107,7 @@ export function addTools(page) {
     mark.hidden = false;
     setTimeout(() => mark.hidden = true, MARK_MS);
   };
-  onDoubleTap(canvas, orbitPlace);
+  onDoubleTap(view, orbitPlace);
 
   addClipping(toolOf("clip"), (shares) => {
     const bounds = page.bounds();
@@ -123,7 +123,7 @@ export function addTools(page) {
     toolOf("recording").hidden = !recorder.isOn;
   };
   const turntable = new Turntable({camera: () => viewer.camera, center: page.center, move: page.move}, showRunning);
-  const recorder = new Recorder(canvas, showRunning);
+  const recorder = new Recorder(() => viewer.canvas, showRunning);
   const turn = () => {
     if (turntable.isOn) turntable.stop();
     else turntable.start();
@@ -178,13 +178,15 @@ export function addTools(page) {
     });
   }
 
-  canvas.addEventListener("keydown", (event) => {
+  view.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey) return;
     const {key} = event;
     if ("xyzXYZ".includes(key) && key.length === 1) look((key === key.toLowerCase() ? "+" : "-") + key.toLowerCase());
     else if (key === "c") {
-      const box = canvas.getBoundingClientRect();
-      orbitPlace(box.left + box.width / 2, box.top + box.height / 2);
+      const box = view.getBoundingClientRect();
+      const {canvas, renderer} = viewer;
+      const [right, up] = renderer.framedMiddle();
+      orbitPlace(box.left + box.width * (0.5 + right / canvas.width), box.top + box.height * (0.5 - up / canvas.height));
     }
     else if (key === "t") turn();
     else if (key === "r" && canRecord()) record();

@@ -548,15 +548,17 @@ def test_tools(browser):
           f"a double click: {pivot}, {low}, {high}")
     check(not browser.value("document.getElementById('mark').hidden"), "the point is marked")
 
-    def place_of(point):  # the VDI's whole width stays in view, so 360 of the 400 rows are framed
+    def place_of(point):
+        half, right_of, above = browser.value("(({renderer}) => [renderer.framedHeight() / 2, ...renderer.framedMiddle()]"
+                                              ".map((n) => n / devicePixelRatio))(vdiPage.viewer)")
         camera = camera_of(browser)
         forward = np.subtract(camera["focalPoint"], camera["position"])
         forward /= np.linalg.norm(forward)
         right = np.cross(forward, camera["viewUp"])
         right /= np.linalg.norm(right)
         offset = np.subtract(point, camera["position"])
-        scale = 180 / math.tan(math.radians(camera["viewAngle"] / 2)) / (offset @ forward)
-        return np.array([320 + scale * (offset @ right), 200 - scale * (offset @ np.cross(right, forward))])
+        scale = half / math.tan(math.radians(camera["viewAngle"] / 2)) / (offset @ forward)
+        return np.array([320 + right_of + scale * (offset @ right), 200 - above - scale * (offset @ np.cross(right, forward))])
 
     check(np.allclose(place_of(pivot), (330, 170), atol=1), f"the chosen point is where the click was: {place_of(pivot)}")
     browser.drag((100, 100), (180, 130))

@@ -4,6 +4,7 @@ import {basisOf, cameraOfText, cameraText, clipMatrix, halfHeightOf, orbited, pa
 import {addControls} from "../../web/controls.js";
 import {numberText, rangeText, ticksOf} from "../../web/legend.js";
 import {outlineEnds} from "../../web/renderer.js";
+import {PendingRequests} from "../../web/pending.js";
 import {SteerPanel, steppedValue} from "../../web/steerpanel.js";
 import {Viewer} from "../../web/viewer.js";
 import {check, finish} from "./check.mjs";
@@ -373,8 +374,8 @@ function steered() {
   /** @type {any[]} */
   const asked = [];
   /** @type {any} */
-  const live = {steering: null, denied: "", steer: (/** @type {any} */ wish) => asked.push(wish)};
-  const panel = new SteerPanel(live, {camera: () => undefined, angle: () => 0});
+  const live = {steering: null, denied: "", pending: new PendingRequests(), steer: (/** @type {any} */ wish) => asked.push(wish)};
+  const panel = new SteerPanel(live, {camera: () => undefined, angle: () => 0, colors: () => []});
   const say = (/** @type {any} */ generator, /** @type {any[]} */ parameters = []) => {
     live.steering = {you: 1, driver: 1, period: 1, paused: false, parameters,
                      generator: {resolution: [640, 360], supersegments: 25, presets: [], ...generator}};

@@ -118,10 +118,8 @@ for name, usual, value, words in (("UseSeparateOpacityArray", 0, 1, "Separate Op
                                   ("VolumetricScatteringBlending", 0, 1, "Volumetric Scattering"),
                                   ("VolumeAnisotropy", 0, 0.5, "Anisotropy"),
                                   ("GlobalIlluminationReach", 0, 0.5, "Global Illumination Reach"),
-                                  ("InterpolationType", "Linear", "Cubic", "Interpolation Type"),
                                   ("Scale", [1, 1, 1], [1, 1, 2], "Transforming")):
-    if name not in representation.ListProperties() or value == "Cubic" and "Cubic" not in \
-            representation.GetProperty(name).Available:
+    if name not in representation.ListProperties():
         continue  # not in this version of ParaView
     setattr(representation, name, value)
     with Messages("WarningEvent") as said:

@@ -22,6 +22,7 @@
 #include "vdi/core/Blending.h"
 #include "vdi/core/Box.h"
 #include "vdi/core/Camera.h"
+#include "vdi/core/GenerateSettings.h"
 #include "vdi/core/Shading.h"
 
 namespace pv {
@@ -227,9 +228,11 @@ void takeBlending(vtkSMProxy* filter, vtkSMProxy* shown) {
 void takeInterpolation(vtkSMProxy* filter, vtkSMProxy* shown) {
   if (!isVolume(shown) || shown->GetProperty("InterpolationType") == nullptr) return;
   if (!areUnset(filter, {"InterpolationType"})) return;
-  // The filter has VTK's numbers.
-  vtkSMPropertyHelper(filter, "InterpolationType")
-      .Set(vtkSMPropertyHelper(shown, "InterpolationType").GetAsInt());
+  // ParaView's default is Cubic, which renderers on the GPU take for linear.
+  const bool isNearest = vtkSMPropertyHelper(shown, "InterpolationType").GetAsInt() == 0;
+  const vdi::Interpolation interpolation =
+      isNearest ? vdi::Interpolation::Nearest : vdi::Interpolation::Linear;
+  vtkSMPropertyHelper(filter, "InterpolationType").Set(static_cast<int>(interpolation));
 }
 
 std::string displayIssues(vtkSMProxy* shown) {
@@ -261,11 +264,6 @@ std::string displayIssues(vtkSMProxy* shown) {
   }
   if (isOn(shown, "Shade") && isChanged(shown, "Specular")) {
     add("The view shows highlights (its Specular), but VolumetricDepthImage shades without them.");
-  }
-  if (vtkSMProperty* interpolation = shown->GetProperty("InterpolationType");
-      interpolation != nullptr && vtkSMPropertyHelper(interpolation).GetAsInt() > 1) {
-    add("The view interpolates this volume by cubic polynomials (its Interpolation Type), but "
-        "VolumetricDepthImage does it linearly.");
   }
   // ParaView 5.13 has renamed Position to Translation.
   if (isAnyChanged({"Position", "Translation", "Scale", "Orientation"})) {
