@@ -145,7 +145,8 @@ std::vector<Stretch> stretchesOf(const TransferFunction& function) {
   constexpr std::size_t most = 60000;
   constexpr int levels = 32;
   std::vector<Stretch> stretches;
-  for (double tolerance = 0.002; tolerance < 1.0; tolerance *= 4.0) {
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    const double tolerance = 0.002 * std::pow(4.0, attempt);
     stretches.clear();
     for (std::size_t i = 0; i + 1 < xs.size() && stretches.size() <= most; ++i) {
       const Segment segment{xs[i], xs[i + 1], glm::dvec4(function.colorAt(xs[i]), function.opacityAt(xs[i])),
@@ -177,7 +178,8 @@ void fillEntries(const TransferFunction& function, const std::vector<double>& st
 }
 
 /// The means of the function from each entry to the next. Between entries, extinction may be far from linear:
-/// an opacity that rises to 1 has a mean that is much less than that of its ends.
+/// an opacity that rises to nearly 1 has a mean that is much less than that of its ends. Beside an entry of
+/// opacity 1, the mean is that of the ends: edges of opaque bands are as sharp at any sampling rate.
 void fillMeans(const TransferFunction& function, const std::vector<Stretch>& stretches,
                TransferTable& table) {
   table.means.resize(table.positions - 1);
@@ -204,6 +206,8 @@ void fillMeans(const TransferFunction& function, const std::vector<Stretch>& str
     }
     if (place < to) sum += (to - place) * above;
     table.means[i] = sum / (to - from);
+    const glm::vec4 ends = 0.5F * (table.entries[i].vector() + table.entries[i + 1].vector());
+    if (ends.a >= 0.5F * maxExtinction) table.means[i] = ends;
   }
 }
 
