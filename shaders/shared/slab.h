@@ -12,7 +12,7 @@ VDI_CONST uint slabStripStep = slabSide - 1u;
 
 // A slab of pieces (shaders/pieces.glsl) is integrated in that many parts where its optical depth is larger
 // than this; in less, nearer material hides nothing.
-VDI_CONST uint slabParts = 16u;
+VDI_CONST uint slabParts = 64u;
 VDI_CONST float slabThin = 0.1f;
 
 // A stretch of the transfer function, linear in associated colour and extinction (TransferPiece in
