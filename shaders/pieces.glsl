@@ -32,12 +32,11 @@ vec4 meanEntry(float front, float back) {
   uint first = pieceAt(low);
   lastPiece = first;
   SlabPiece begin = params.pieces.at[first];
-  if (high < begin.end) return inPiece(begin, 0.5 * (low + high));
+  if (high <= begin.end) return inPiece(begin, 0.5 * (low + high));
   uint last = pieceAt(high);
   lastPiece = front < back ? last : first;
-  SlabPiece behind = params.pieces.at[min(first + 1u, last)];
+  SlabPiece behind = params.pieces.at[first + 1u];
   SlabPiece end = params.pieces.at[last];
-  if (first == last) return inPiece(begin, 0.5 * (low + high));
   vec4 sum = (end.sum - behind.sum) + (end.sumRest - behind.sumRest);
   sum += 0.5 * (begin.end - low) * (inPiece(begin, low) + begin.back);
   sum += 0.5 * (high - end.start) * (end.front + inPiece(end, high));

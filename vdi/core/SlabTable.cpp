@@ -66,14 +66,8 @@ glm::dvec4 SlabIntegral::upTo(double position) const {
          (position - inside) * (position < inside ? ends_.front : ends_.back);
 }
 
-std::size_t SlabIntegral::pieceAt(double position) const {
-  const auto above = std::ranges::upper_bound(pieces_, position, {}, &TransferPiece::start);
-  return above == pieces_.begin() ? 0 : static_cast<std::size_t>(above - pieces_.begin()) - 1;
-}
-
 double SlabIntegral::endOf(std::size_t piece) const {
-  constexpr double far = 1e30;
-  return piece + 1 < pieces_.size() ? pieces_[piece + 1].start : far;
+  return piece + 1 < pieces_.size() ? pieces_[piece + 1].start : farPosition;
 }
 
 glm::dvec4 SlabIntegral::inPiece(std::size_t piece, double position) const {
@@ -83,8 +77,8 @@ glm::dvec4 SlabIntegral::inPiece(std::size_t piece, double position) const {
 }
 
 glm::dvec4 SlabIntegral::meanOfPieces(double low, double high) const {
-  const std::size_t first = pieceAt(low);
-  const std::size_t last = pieceAt(high);
+  const std::size_t first = pieceAt(pieces_, low);
+  const std::size_t last = pieceAt(pieces_, high);
   if (first == last) return inPiece(first, 0.5 * (low + high));
   const double begin = endOf(first);
   const double end = pieces_[last].start;

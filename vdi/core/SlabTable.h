@@ -33,6 +33,8 @@ class SlabIntegral {
   glm::dvec4 mean(double front, double back, double length) const;
   /// The mean's associated colour and extinction; at a single position the function's own.
   glm::dvec4 meanEntry(double front, double back) const;
+  /// The integral from the second piece's start to that of the piece. Requires pieces.
+  const glm::dvec4& upToPiece(std::size_t piece) const { return sums_[piece]; }
 
  private:
   /// The function between two entries, linear.
@@ -41,7 +43,6 @@ class SlabIntegral {
     glm::dvec4 back{0.0};
   };
   glm::dvec4 upTo(double position) const;  // the transfer table's integral from position 0 on
-  std::size_t pieceAt(double position) const;
   double endOf(std::size_t piece) const;
   glm::dvec4 inPiece(std::size_t piece, double position) const;
   glm::dvec4 meanOfPieces(double low, double high) const;

@@ -62,6 +62,13 @@ struct TransferPiece {
   bool operator==(const TransferPiece&) const = default;
 };
 
+/// Beyond any position: the first piece starts, and the last one ends, that far from 0. Also the limit of
+/// tablePosition in shaders/raycast.glsl.
+inline constexpr double farPosition = 1e30;
+
+/// The index of the piece at a position. Requires pieces.
+std::size_t pieceAt(const std::vector<TransferPiece>& pieces, double position);
+
 /// The function as lookups read it, in one of two forms. Both are constant outside the nodes.
 ///
 /// - Entries: even samples from `min` to `max`, linear in between. Most functions have this form. A lookup of

@@ -18,7 +18,6 @@ namespace {
 constexpr std::size_t smallestTable = 1024;
 constexpr std::size_t tableOfSteps = 4096;
 constexpr std::size_t largestTable = 16384;
-constexpr double farPosition = 1e30;  // the limit of tablePosition in shaders/raycast.glsl
 
 double extinctionOf(double opacity) {
   if (opacity >= 1.0) return maxExtinction;
@@ -326,6 +325,11 @@ TransferTable bake(const TransferFunction& transferFunction) {
   return table;
 }
 
+std::size_t pieceAt(const std::vector<TransferPiece>& pieces, double position) {
+  const auto next = std::ranges::upper_bound(pieces, position, {}, &TransferPiece::start);
+  return next == pieces.begin() ? 0 : static_cast<std::size_t>(next - pieces.begin()) - 1;
+}
+
 std::string describeLoss(const TransferFunction& transferFunction) {
   const std::vector<double> lost = bake(transferFunction).lost;
   if (lost.empty()) return {};
@@ -357,11 +361,10 @@ struct Neighbors {
 
 Neighbors neighborsOf(const TransferTable& table, double position) {
   if (!table.pieces.empty()) {
-    const auto next = std::ranges::upper_bound(std::next(table.pieces.begin()), table.pieces.end(), position,
-                                               {}, &TransferPiece::start);
-    const TransferPiece& piece = *std::prev(next);
-    if (next == table.pieces.end()) return {piece.front, piece.back, 0.0F};
-    const double width = static_cast<double>(next->start) - piece.start;
+    const std::size_t index = pieceAt(table.pieces, position);
+    const TransferPiece& piece = table.pieces[index];
+    if (index + 1 == table.pieces.size()) return {piece.front, piece.back, 0.0F};
+    const double width = static_cast<double>(table.pieces[index + 1].start) - piece.start;
     const double share = std::clamp((position - piece.start) / width, 0.0, 1.0);
     return {piece.front, piece.back, static_cast<float>(share)};
   }

@@ -418,42 +418,35 @@ void VolumeStore::uploadPieces() {
   pieceStartBuffer_.reserve(device_, count * sizeof(float), MemoryKind::Upload);
   const auto uploaded = pieceBuffer_.mappedAs<shared::SlabPiece>();
   const auto starts = pieceStartBuffer_.mappedAs<float>();
-  constexpr float far = 1e30F;
-  glm::dvec4 sum(0.0);
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     const TransferPiece& piece = pieces[i];
-    const float end = i + 1 < pieces.size() ? pieces[i + 1].start : far;
+    const glm::dvec4& sum = slabTable_.integral->upToPiece(i);
+    const float end = i + 1 < pieces.size() ? pieces[i + 1].start : static_cast<float>(farPosition);
     const glm::vec4 high(sum);
     uploaded[i] = {piece.start, end, piece.front, piece.back, high, glm::vec4(sum - glm::dvec4(high))};
     starts[i] = piece.start;
-    const double width = static_cast<double>(end) - piece.start;
-    if (i > 0) sum += 0.5 * width * (glm::dvec4(piece.front) + glm::dvec4(piece.back));
   }
 }
 
 void VolumeStore::uploadSlabs() {
-  const auto bytes = std::as_bytes(std::span(slabTable_.texels));
-  // Programs for pieces don't read the texture, but it must exist.
-  const glm::uvec2 extent = bytes.empty() ? glm::uvec2(1) : glm::uvec2(shared::slabSide, slabTable_.height());
-  const bool isNew = !slabs_ || (!bytes.empty() && glm::uvec2(slabs_.extent()) != extent);
+  const bool hasTexels = !slabTable_.texels.empty();
+  if (!hasTexels && slabs_) return;  // programs for pieces don't read the texture, but it must exist
+  const glm::uvec2 extent = hasTexels ? glm::uvec2(shared::slabSide, slabTable_.height()) : glm::uvec2(1);
+  const bool isNew = !slabs_ || glm::uvec2(slabs_.extent()) != extent;
   if (isNew) {
     slabs_ = SampledImage::plane(device_, extent, VK_FORMAT_R16G16B16A16_SFLOAT);
     ++slabsVersion_;
   }
-  if (bytes.empty() && !isNew) return;
-  if (bytes.empty()) {
-    commands_.begin();
-    commands_.clear(slabs_);
-    commands_.submitAndWait();
-    return;
-  }
-  slabStaging_.reserve(device_, bytes.size(), MemoryKind::Upload);
-  copyInParallel(bytes, slabStaging_.mapped().data());
   commands_.begin();
   if (isNew) commands_.clear(slabs_);
-  commands_.beginUpload(slabs_);
-  commands_.copyToImage(slabStaging_, 0, slabs_, glm::uvec3(0), slabs_.extent());
-  commands_.endUpload(slabs_);
+  if (hasTexels) {
+    const auto bytes = std::as_bytes(std::span(slabTable_.texels));
+    slabStaging_.reserve(device_, bytes.size(), MemoryKind::Upload);
+    copyInParallel(bytes, slabStaging_.mapped().data());
+    commands_.beginUpload(slabs_);
+    commands_.copyToImage(slabStaging_, 0, slabs_, glm::uvec3(0), slabs_.extent());
+    commands_.endUpload(slabs_);
+  }
   commands_.submitAndWait();
 }
 

@@ -362,7 +362,6 @@ void VolumeUpload::run(std::span<const VolumePiece> pieces, std::span<const Samp
     Plan plan;
     for (const VolumePiece& piece : pieces) {
       if (!places_ && copyDirectly(piece, pages[piece.page], imported)) {
-        // Patches overwrite the copied values.
         for (const Patch& patch : piece.block->patchList()) {
           const IndexBox part = patch.box.intersection(piece.box());
           if (!part.empty()) plan.add(piece, part, places_);
@@ -371,6 +370,7 @@ void VolumeUpload::run(std::span<const VolumePiece> pieces, std::span<const Samp
         plan.add(piece, piece.box(), places_);
       }
     }
+    frame_.barrier();  // patches overwrite the values that were copied directly
     frame_.submit();
     if (places_) bindPages(pages);
     makeSlots(plan);

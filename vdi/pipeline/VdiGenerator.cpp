@@ -123,6 +123,8 @@ struct VdiGenerator::State {
   /// Settings and size of the last frame.
   std::optional<std::tuple<GenerateSettings, int, int>> lastKind;
   detail::Expectation expected;
+  TransferFunction tableOf;  // most frames have the function of the frame before
+  std::shared_ptr<const TransferTable> table;
   std::exception_ptr gone;  // the error of frames that outlive this; made early, as a destructor can't fail
   RankReport mine;
   std::vector<RankReport> reports;
@@ -132,7 +134,7 @@ struct VdiGenerator::State {
     View view;
     DepthLattice lattice;
     double samplesPerVoxel = 1.0;  // never automaticRate
-    TransferTable table;
+    std::shared_ptr<const TransferTable> table;
     TransferFunction legend;  // the function, simplified
   };
 
@@ -146,13 +148,17 @@ struct VdiGenerator::State {
       validate(settings);
       if (result == For::Vdi) requireComposite(settings.blending);
       const Scene& scene = steps->scene();
-      TransferTable table = bake(function);
+      if (!table || function != tableOf) {
+        auto made = std::make_shared<const TransferTable>(bake(function));
+        tableOf = TransferFunction(function);  // moved, so that no failure parts the two
+        table = std::move(made);
+      }
       GenerateSettings own = settings;
       if (settings.samplesPerVoxel == automaticRate) {
         // Nearest values make right pictures at any rate, but faces between voxels lie within a sample.
         own.samplesPerVoxel = settings.interpolation == Interpolation::Nearest
                                   ? rateOfNearest
-                                  : steps->samplingRate(table, settings.region);
+                                  : steps->samplingRate(*table, settings.region);
       }
       // The compact form matters more than extra samples.
       while (settings.samplesPerVoxel == automaticRate && own.samplesPerVoxel > 1.0 &&
@@ -161,11 +167,10 @@ struct VdiGenerator::State {
       if (settings.blending.mode == BlendMode::Isosurface)
         own.samplesPerVoxel = rateOfSlabs(scene, camera, own);
       const View view = viewWithMargin(scene, camera, own);
-      prepared =
-          std::make_unique<Prepared>(Prepared{view, depthLattice(scene, view, own.samplesPerVoxel),
-                                              own.samplesPerVoxel, std::move(table), simplified(function)});
+      prepared = std::make_unique<Prepared>(Prepared{view, depthLattice(scene, view, own.samplesPerVoxel),
+                                                     own.samplesPerVoxel, table, simplified(function)});
       requireTractable(prepared->lattice, *device);
-      steps->requireSpans(prepared->table);
+      steps->requireSpans(*prepared->table);
     });
     mine = {};
     mine.samplesPerVoxel = prepared->samplesPerVoxel;
@@ -175,7 +180,7 @@ struct VdiGenerator::State {
 
   detail::RayCaster::Inputs castInputsOf(const Prepared& prepared, const GenerateSettings& settings,
                                          const ListForm& form, bool runsOnly = false) const {
-    return {steps->scene(), prepared.view,   prepared.lattice, prepared.table,
+    return {steps->scene(), prepared.view,   prepared.lattice, *prepared.table,
             settings,       comm.size() > 1, runsOnly,         form};
   }
 
@@ -343,7 +348,8 @@ struct VdiGenerator::State {
     if (comm.rank() != root) mine.bytesSent += extremes.size() * sizeof(std::uint64_t);
     mine.gatherSeconds = watch.lap();
     comm.together([&] {
-      if (comm.rank() == root) detail::colorExtremes(extremes, settings.blending.mode, prepared.table, image);
+      if (comm.rank() == root)
+        detail::colorExtremes(extremes, settings.blending.mode, *prepared.table, image);
     });
     mine.compositeSeconds = watch.lap();
   }
