@@ -201,9 +201,7 @@ class Series {
     const ScalarRange& range = generator_.scalarRange();
     const bool isAutomatic = function.colors.front().x == range.min && function.colors.back().x == range.max;
     const std::optional<ScalarRange> part = isAutomatic ? generator_.crowdedPart() : std::nullopt;
-    if (part) {
-      fmt::print(stderr, "vdi: {} (--transfer-function FILE, --missing)\n", describeCrowded(range, *part));
-    }
+    if (part) say(describeCrowded(range, *part) + " (--transfer-function FILE, --missing)");
   }
   std::vector<Block> read(std::size_t index) const {
     return options_.raws.empty()

@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -68,6 +69,8 @@ Movie::Movie(std::filesystem::path path, int width, int height, double rate)
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0)
     fail(std::string("can't make a pipe: ") + std::strerror(errno), path_);
+  const Descriptor input(ends[0]);
+  pipe_ = Descriptor(ends[1]);
   std::vector<std::string> words = wordsOf(part_, width, height, rate);
   std::vector<char*> arguments;
   arguments.reserve(words.size() + 1);
@@ -75,13 +78,10 @@ Movie::Movie(std::filesystem::path path, int width, int height, double rate)
   arguments.push_back(nullptr);
   posix_spawn_file_actions_t actions{};
   ::posix_spawn_file_actions_init(&actions);
-  ::posix_spawn_file_actions_adddup2(&actions, ends[0], STDIN_FILENO);
+  ::posix_spawn_file_actions_adddup2(&actions, input.number(), STDIN_FILENO);
   const int error = ::posix_spawnp(&process_, "ffmpeg", &actions, nullptr, arguments.data(), ::environ);
   ::posix_spawn_file_actions_destroy(&actions);
-  ::close(ends[0]);
-  pipe_ = ends[1];
   if (error == 0) return;
-  ::close(pipe_);
   fail(error == ENOENT ? "a movie needs the program ffmpeg, which isn't installed; without --movie, numbered "
                          "PNGs are written"
                        : std::string("can't start ffmpeg: ") + std::strerror(error),
@@ -97,14 +97,7 @@ Movie::~Movie() {
 }
 
 void Movie::add(const io::Picture& picture) {
-  const std::uint8_t* bytes = picture.rgb.data();
-  for (std::size_t left = picture.rgb.size(); left > 0;) {
-    const ssize_t written = ::write(pipe_, bytes, left);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) fail("ffmpeg has failed", path_);
-    bytes += written;
-    left -= static_cast<std::size_t>(written);
-  }
+  if (!writeAll(pipe_.number(), std::as_bytes(std::span(picture.rgb)))) fail("ffmpeg has failed", path_);
 }
 
 void Movie::finish() {
@@ -118,7 +111,7 @@ void Movie::finish() {
 }
 
 bool Movie::end() {
-  ::close(std::exchange(pipe_, -1));
+  pipe_ = Descriptor();
   int status = 0;
   const pid_t process = std::exchange(process_, -1);
   while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {

@@ -5,6 +5,7 @@
 
 #include <filesystem>
 
+#include "vdi/core/Descriptor.h"
 #include "vdi/io/Png.h"
 
 namespace vdi::apps {
@@ -36,7 +37,7 @@ class Movie {
   std::filesystem::path path_;
   std::filesystem::path part_;
   pid_t process_ = -1;
-  int pipe_ = -1;
+  Descriptor pipe_;  // to ffmpeg
 };
 
 }  // namespace vdi::apps

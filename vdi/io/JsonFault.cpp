@@ -16,7 +16,7 @@ std::string jsonFault(std::string_view text, std::size_t taken, int id) {
   if (byte < ' ' || byte == 0x7f) return fmt::format("it has the control character U+{:04X}", byte);
   if (byte >= 0x80) return "it isn't UTF-8, or has such a character outside strings";
   constexpr std::size_t before = 20;
-  const std::size_t start = text.rfind('\n', at) == std::string_view::npos ? 0 : text.rfind('\n', at) + 1;
+  const std::size_t start = text.rfind('\n', at) + 1;  // npos + 1 is 0
   std::size_t from = std::max(start, at > before ? at - before : 0);
   while (from < at && (static_cast<unsigned char>(text[from]) & 0xc0U) == 0x80) ++from;  // a whole character
   if (from == at) return fmt::format("'{}' isn't expected at the start of the line", text[at]);

@@ -25,7 +25,7 @@ def triple(what, given, convert, example):
     return numbers
 
 
-def whole_triple(what, given, example="(64, 64, 64)"):
+def whole_triple(what, given, example):
     return triple(what, given, operator.index, "%s; int() makes whole numbers" % example)
 
 

@@ -173,15 +173,14 @@ def _load():
 
 
 class _Masked:
-    """A copy of a masked array, in which masked values are NaN. `fill` makes the copy anew, from the values and the mask as
-    they are then."""
+    """Memory for a copy of a masked array, in which masked values are NaN. `fill` makes the copy, from the values and the
+    mask as they are then."""
 
     def __init__(self, array):
         self._array = array
         kind, size = array.dtype.kind, array.dtype.itemsize
         narrow = kind in "iub" and size < 4  # floats hold all values of these types
         self.values = np.empty(array.shape, array.dtype if kind not in "iub" else "float32" if narrow else "float64")
-        self.fill()
 
     def fill(self):
         np.copyto(self.values, self._array.data)
@@ -402,11 +401,11 @@ class Catalyst:
     def execute(self, step, time=0.0):
         """Makes what the scripts or the JSON ask for, from the current values. `step` is the same on all ranks and at least 0,
         with scripts below 2**31, and `time` is finite."""
-        for copies in self._masked.values():
-            for copy in copies:
-                copy.fill()
         with self._or_refused(self._library.vdi_catalyst_execute, -1, 0.0):
             step, time = _faults.whole_number("the step", step, "int(step)"), float(time)
+            for copies in self._masked.values():
+                for copy in copies:
+                    copy.fill()
         self._check(self._library.vdi_catalyst_execute(self._handle, step, time))
 
     def parameter(self, name, value, low, high):
@@ -431,9 +430,9 @@ class Catalyst:
     def close(self):
         """Ends the run, before MPI is finalized. A second call does nothing. ParaView stays for another run with scripts."""
         code = self._run.end()
-        if code == BUSY:
-            self._check(code)
-        self._kept = {}
+        if code != BUSY:
+            self._kept = {}
+            self._masked = {}
         self._check(code)
 
     def __enter__(self):
