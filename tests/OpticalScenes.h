@@ -58,6 +58,22 @@ struct OpticalScene {
   reference::ExactVolume whole;
 };
 
+/// A whole lattice from the world's origin on. valueAt(index) gives its values.
+template <typename ValueAt>
+reference::ExactVolume wholeOf(const glm::ivec3& size, double spacing, bool cells, ValueAt valueAt) {
+  reference::ExactVolume whole{size,
+                               glm::dvec3(cells ? 0.5 * spacing : 0.0),
+                               glm::dvec3(spacing),
+                               {glm::dvec3(0.0), glm::dvec3(size - (cells ? 0 : 1)) * spacing},
+                               {}};
+  for (int z = 0; z < size.z; ++z) {
+    for (int y = 0; y < size.y; ++y) {
+      for (int x = 0; x < size.x; ++x) whole.values.push_back(valueAt(glm::ivec3(x, y, z)));
+    }
+  }
+  return whole;
+}
+
 inline OpticalScene opticalScene(const Stretch& stretch, synthetic::Joint joint,
                                  const glm::ivec3& blocks = glm::ivec3(1),
                                  synthetic::Layout layout = synthetic::Layout::OnOneRank, int rank = 0,
@@ -76,24 +92,12 @@ inline OpticalScene opticalScene(const Stretch& stretch, synthetic::Joint joint,
     scene.mine.push_back(synthetic::makeBlock(lattice, part, valueAt));
     if (fill) leaveOutMissing(scene.mine.back(), std::array{*fill, 0.5, 1e300});
   }
-  scene.whole = {size,
-                 glm::dvec3(cells ? 0.5 * spacing : 0.0),
-                 glm::dvec3(spacing),
-                 {glm::dvec3(0.0), glm::dvec3(size - (cells ? 0 : 1)) * spacing},
-                 {}};
   const bool whole = stretch.type != ScalarType::F32 && stretch.type != ScalarType::F64;
-  for (int z = 0; z < size.z; ++z) {
-    for (int y = 0; y < size.y; ++y) {
-      for (int x = 0; x < size.x; ++x) {
-        const double value = valueAt({x, y, z});
-        if (fill && isMissing({x, y, z})) {
-          scene.whole.values.push_back(std::numeric_limits<double>::quiet_NaN());
-        } else {
-          scene.whole.values.push_back(whole ? std::round(value) : value);
-        }
-      }
-    }
-  }
+  scene.whole = wholeOf(size, spacing, cells, [&](const glm::ivec3& index) {
+    if (fill && isMissing(index)) return std::numeric_limits<double>::quiet_NaN();
+    const double value = valueAt(index);
+    return whole ? std::round(value) : value;
+  });
   return scene;
 }
 

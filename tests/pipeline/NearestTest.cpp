@@ -55,17 +55,8 @@ Labels labelsOf(ScalarType type, Joint joint, const glm::ivec3& blocks) {
   for (const synthetic::Part& part :
        synthetic::decompose(size, blocks, synthetic::Layout::OnOneRank, joint, 1, 3))
     labels.blocks.push_back(synthetic::makeBlock(lattice, part, valueAt));
-  labels.whole = {size,
-                  glm::dvec3(cells ? 0.5 * spacing : 0.0),
-                  glm::dvec3(spacing),
-                  {glm::dvec3(0.0), glm::dvec3(size - (cells ? 0 : 1)) * spacing},
-                  {},
-                  true};
-  for (int z = 0; z < size.z; ++z) {
-    for (int y = 0; y < size.y; ++y) {
-      for (int x = 0; x < size.x; ++x) labels.whole.values.push_back(valueAt({x, y, z}));
-    }
-  }
+  labels.whole = test::wholeOf(size, spacing, cells, valueAt);
+  labels.whole.nearest = true;
   return labels;
 }
 

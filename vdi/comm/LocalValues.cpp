@@ -51,24 +51,23 @@ void LocalValues::gather(const Block& block, const Indices& indices) {
   if (block.isPacked()) {
     takeArray(block.stored(), block.data);
   } else {
-    takeCopies(block, indices);
+    takeCopies(block.type, block, block.stored(), glm::ivec3(0), indices);
   }
-  for (const Patch& patch : block.patchList())
-    patch.values ? takeArray(patch.box, patch.values.get()) : takeDonors(block.type, patch, indices);
+  for (const Patch& patch : block.patchList()) {
+    if (patch.values) {
+      takeArray(patch.box, patch.values.get());
+    } else {
+      takeCopies(block.type, *patch.donor, patch.box, patch.shift, indices);
+    }
+  }
 }
 
-void LocalValues::takeCopies(const Block& block, const Indices& indices) {
-  row_.resize(static_cast<std::size_t>(block.dims.x));
-  take(block.type, block.stored(), indices, [&](const glm::ivec3& at, int end) -> const void* {
-    block.copyTo({at, {end, at.y + 1, at.z + 1}}, row_.data());
-    return row_.data();
-  });
-}
-
-void LocalValues::takeDonors(ScalarType type, const Patch& patch, const Indices& indices) {
-  row_.resize(static_cast<std::size_t>(patch.box.size().x));
-  take(type, patch.box, indices, [&](const glm::ivec3& at, int end) -> const void* {
-    patch.donor->copyTo({at + patch.shift, glm::ivec3(end, at.y + 1, at.z + 1) + patch.shift}, row_.data());
+/// Takes values of `from` for `box`, whose indices plus `shift` are those of `from`.
+void LocalValues::takeCopies(ScalarType type, const Block& from, const IndexBox& box, const glm::ivec3& shift,
+                             const Indices& indices) {
+  row_.resize(static_cast<std::size_t>(box.size().x));
+  take(type, box, indices, [&](const glm::ivec3& at, int end) -> const void* {
+    from.copyTo({at + shift, glm::ivec3(end, at.y + 1, at.z + 1) + shift}, row_.data());
     return row_.data();
   });
 }

@@ -29,8 +29,8 @@ class LocalValues {
  private:
   template <typename RowAt>
   void take(ScalarType type, const IndexBox& box, const Indices& indices, RowAt rowAt);
-  void takeCopies(const Block& block, const Indices& indices);
-  void takeDonors(ScalarType type, const Patch& patch, const Indices& indices);
+  void takeCopies(ScalarType type, const Block& from, const IndexBox& box, const glm::ivec3& shift,
+                  const Indices& indices);
 
   std::vector<double> values_;
   std::vector<double> row_;  // memory for values that aren't an array

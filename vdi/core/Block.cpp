@@ -146,12 +146,9 @@ void Block::setStrides(const ByteStrides& bytes) {
 }
 
 void Block::copyTo(const IndexBox& box, void* to) const {
+  if (!computed) return copyTo(box, to, packedStrides(box.size(), sizeOf(type)));
   assert(!box.empty() && box == box.intersection(stored()));
-  if (computed) return computed->read(box, to);
-  const std::size_t bytes = sizeOf(type);
-  const ByteStrides from = strides.value_or(packedStrides(dims, bytes));
-  copyStrided(static_cast<const std::byte*>(data) + offsetOf(box.lo, from), from, to,
-              packedStrides(box.size(), bytes), box.size(), bytes);
+  computed->read(box, to);
 }
 
 void Block::copyTo(const IndexBox& box, void* to, const ByteStrides& apart) const {

@@ -25,29 +25,10 @@ ScalarType scalarTypeOf(ComponentType type) {
 /// Calls `visit` with a zero of the type.
 template <typename Visit>
 auto withZero(ComponentType type, Visit visit) {
-  switch (type) {
-    case ComponentType::U8:
-      return visit(std::uint8_t{});
-    case ComponentType::I8:
-      return visit(std::int8_t{});
-    case ComponentType::U16:
-      return visit(std::uint16_t{});
-    case ComponentType::I16:
-      return visit(std::int16_t{});
-    case ComponentType::U32:
-      return visit(std::uint32_t{});
-    case ComponentType::I32:
-      return visit(std::int32_t{});
-    case ComponentType::F32:
-      return visit(float{});
-    case ComponentType::I64:
-      return visit(std::int64_t{});
-    case ComponentType::U64:
-      return visit(std::uint64_t{});
-    case ComponentType::F64:
-      break;
-  }
-  return visit(double{});
+  if (type == ComponentType::I64) return visit(std::int64_t{});
+  if (type == ComponentType::U64) return visit(std::uint64_t{});
+  return withTyped(scalarTypeOf(type), static_cast<const void*>(nullptr),
+                   [&]<typename T>(const T* /*none*/) { return visit(T{}); });
 }
 
 /// The missing numbers that components of the type can equal, as doubles that equal them exactly.
@@ -93,11 +74,12 @@ class Computation : public ComputedValues {
       Values results;
       compute(tile, std::span(results).first(tile.count()));
       std::array<float, Tiling::values> narrow;
-      if (type_ == ScalarType::F32)
+      const void* from = results.data();
+      if (type_ == ScalarType::F32) {
         std::transform(results.begin(), results.begin() + static_cast<std::ptrdiff_t>(tile.count()),
                        narrow.begin(), [](double value) { return static_cast<float>(value); });
-      const void* from = results.data();
-      if (type_ == ScalarType::F32) from = narrow.data();
+        from = narrow.data();
+      }
       copyStrided(from, packedStrides(tile.size(), bytes),
                   static_cast<std::byte*>(to) + offsetOf(tile.lo - box.lo, strides), strides, tile.size(),
                   bytes);

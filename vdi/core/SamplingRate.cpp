@@ -233,15 +233,11 @@ std::optional<ScalarRange> crowdedPart(const ScalarRange& range, std::span<const
   const auto isCrowded = [&](const ScalarRange& part) {
     return part.max > part.min && part.max - part.min < least * length;
   };
-  const auto [low, high] = std::pair(std::ranges::upper_bound(values, range.min) - values.begin(),
-                                     std::ranges::lower_bound(values, range.max) - values.begin());
   const std::span<const double> all(values);
-  for (const auto& [first, last] : {std::pair<std::ptrdiff_t, std::ptrdiff_t>{0, std::ssize(values)},
-                                    {low, std::ssize(values)},
-                                    {0, high}}) {
-    if (last - first < static_cast<std::ptrdiff_t>(fewest)) continue;
-    const std::span<const double> some =
-        all.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(last - first));
+  const auto low = static_cast<std::size_t>(std::ranges::upper_bound(values, range.min) - values.begin());
+  const auto high = static_cast<std::size_t>(std::ranges::lower_bound(values, range.max) - values.begin());
+  for (const std::span<const double>& some : {all, all.subspan(low), all.first(high)}) {
+    if (some.size() < fewest) continue;
     if (const ScalarRange part = shortestPart(some, nearlyAll); isCrowded(part)) return part;
   }
   return std::nullopt;

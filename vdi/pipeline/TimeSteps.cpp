@@ -36,12 +36,15 @@ void requireUsableValues(const comm::Communicator& comm, std::span<const Block> 
 /// Collective: makes a sheet of values, which has no volume, one spacing thick. A block with several layers
 /// that owns no volume is no sheet: it gives all of its places to others.
 void thickenSheet(const comm::Communicator& comm, std::span<Block> blocks) {
-  const glm::dvec3 none(std::numeric_limits<double>::infinity());
-  Box bounds{none, -none};
-  glm::dvec3 finest = none;
+  // Box::empty() is true of a sheet too.
+  const auto ownsNothing = [](const Block& block) {
+    return glm::any(glm::greaterThan(block.owned.lo, block.owned.hi));
+  };
+  Box bounds;
+  glm::dvec3 finest(std::numeric_limits<double>::infinity());
   glm::ivec3 most(0);  // layers across each axis
   for (const Block& block : blocks) {
-    if (glm::any(glm::greaterThan(block.owned.lo, block.owned.hi))) continue;
+    if (ownsNothing(block)) continue;
     bounds = {glm::min(bounds.lo, block.owned.lo), glm::max(bounds.hi, block.owned.hi)};
     finest = glm::min(finest, block.spacing);
     most = glm::max(most, block.dims);
@@ -57,7 +60,7 @@ void thickenSheet(const comm::Communicator& comm, std::span<Block> blocks) {
     if (!(thickness >= 0.0 && thickness < rounding * least[axis + 6]) || least[axis + 9] < -1.0) continue;
     const auto a = static_cast<int>(axis);
     for (Block& block : blocks) {
-      if (glm::any(glm::greaterThan(block.owned.lo, block.owned.hi))) continue;
+      if (ownsNothing(block)) continue;
       block.owned.lo[a] = least[axis] - 0.5 * least[axis + 6];
       block.owned.hi[a] = least[axis] + 0.5 * least[axis + 6];
     }

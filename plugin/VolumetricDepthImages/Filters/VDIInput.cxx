@@ -45,12 +45,10 @@ void requestPiece(vtkInformation* info, vtkAlgorithm* filter, vtkMultiProcessCon
   }
 }
 
-Origin originOf(vtkDataObject* input, vtkAlgorithm* filter, int component, const std::vector<double>& missing,
-                bool fillGhosts) {
+Origin originOf(vtkDataObject* input, vtkAlgorithm* filter, int component, bool fillGhosts) {
   Origin origin;
   origin.choice = choiceOf(filter);
   origin.choice.component = component;
-  origin.choice.missing = missing;
   origin.fillGhosts = fillGhosts;
   if (input != nullptr) {
     if (input->GetInformation()->Has(vtkDataObject::DATA_TIME_STEP()))

@@ -16,8 +16,7 @@ namespace pv {
 void requestPiece(vtkInformation* info, vtkAlgorithm* filter, vtkMultiProcessController* controller);
 
 /// The origin of the blocks in `input`, null or the filter's input, with the filter's array.
-Origin originOf(vtkDataObject* input, vtkAlgorithm* filter, int component, const std::vector<double>& missing,
-                bool fillGhosts);
+Origin originOf(vtkDataObject* input, vtkAlgorithm* filter, int component, bool fillGhosts);
 
 }  // namespace pv
 

@@ -367,7 +367,8 @@ void vtkVDIGenerator::AnnounceRange(const char* array, int components, int compo
 }
 
 pv::Origin vtkVDIGenerator::OriginOf(vtkDataObject* input) {
-  pv::Origin origin = pv::originOf(input, this, this->Component, this->MissingValues, this->FillGhosts);
+  pv::Origin origin = pv::originOf(input, this, this->Component, this->FillGhosts);
+  origin.choice.missing = this->MissingValues;
   origin.choice.nearest = this->Settings[vdi::indexOfSetting("InterpolationType")] ==
                           static_cast<double>(vdi::Interpolation::Nearest);
   return origin;
@@ -491,8 +492,7 @@ pv::FrameInputs vtkVDIGenerator::Announced(pv::FrameInputs frame) {
   if (frame.function == function) return frame;
   function = frame.function;
   const std::string now = vdi::describeLoss(function);
-  const bool isRoot = this->Controller == nullptr || this->Controller->GetLocalProcessId() == 0;
-  if (isRoot && !now.empty() && now != loss) vtkWarningMacro(<< now);
+  if (this->IsRoot() && !now.empty() && now != loss) vtkWarningMacro(<< now);
   loss = now;
   return frame;
 }
