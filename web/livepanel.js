@@ -227,11 +227,12 @@ export class LivePanel {
   refresh() {
     const {live} = this;
     const {state} = live;
+    const text = liveText(live, performance.now());
     // A final failure covers the picture with its message. Attempts to reconnect leave it visible.
-    this.say(state === "refused" ? live.cause : live.shown || state === "closed" ? "" : liveText(live, performance.now()));
-    byId("live").dataset.state = live.isPaused && live.state === "live" ? "paused" : isGone(live) ? "ended" : live.state;
-    byId("livetext").textContent = liveText(live, performance.now());
+    this.say(state === "refused" ? live.cause : live.shown || state === "closed" ? "" : text);
+    byId("live").dataset.state = live.isPaused && state === "live" ? "paused" : isGone(live) ? "ended" : state;
+    byId("livetext").textContent = text;
     byId("pause").textContent = this.label();
-    byId("pause").hidden = live.state === "ended" && !live.isPaused;
+    byId("pause").hidden = state === "ended" && !live.isPaused;
   }
 }

@@ -8,6 +8,7 @@ import {mostElements} from "./gl.js";
 import {rangeText, showLegend} from "./legend.js";
 import {LivePanel, takeToken} from "./livepanel.js";
 import {addPanels} from "./panels.js";
+import {cornerOf} from "./renderer.js";
 import {SteerPanel} from "./steerpanel.js";
 import {embeddedSource, filesSource} from "./sources.js";
 import {length, minus} from "./vector.js";
@@ -68,7 +69,7 @@ const LEAST_FRAME = [64, 48];  // CSS pixels; in a smaller one nothing can be se
 function sceneBox({bounds, camera}) {
   const basis = basisOf(camera), half = halfHeightOf(camera);
   const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((corner) => {
-    const [right, up, depth] = toView(/** @type {Vec3} */ ([0, 1, 2].map((axis) => bounds[(corner >> axis) & 1][axis])), camera, basis);
+    const [right, up, depth] = toView(cornerOf(bounds, corner, [0, 0, 0]), camera, basis);
     const scale = camera.parallel ? 2 * half : depth > 0 ? 2 * half * depth : 0;
     return [right / scale, up / scale];
   });
@@ -149,6 +150,7 @@ export class Page {
       center: () => this.orbitCenter(),
       bounds: () => this.vdi?.bounds,
       move: (camera) => this.setCamera(camera),
+      glide: (camera) => this.glide(() => camera),
       orbit: (point) => this.pivot = point,
       token: () => this.live && !this.source ? this.live.live.options.token : "",
       viewText: () => this.viewText(true),
@@ -444,23 +446,33 @@ export class Page {
     drawAxes(/** @type {SVGElement} */ (/** @type {unknown} */ (element("axes"))), viewer.camera);
   }
 
-  goHome() {
-    const {vdi, viewer} = this;
-    if (!vdi || !viewer.camera) return;
-    this.pivot = undefined;
+  /**
+   * Moves the view in a third of a second, unless the user moves it.
+   * @param {() => Camera | undefined} target it may change on the way
+   * @param {boolean} [isHomeward] whether it is the VDI's viewpoint
+   */
+  glide(target, isHomeward = false) {
+    const {viewer} = this;
     const from = viewer.camera;
+    if (!from) return;
     const start = performance.now();
     let last = from;
     const step = () => {
-      const to = this.vdi?.camera;
+      const to = target();
       if (!to || viewer.camera !== last) return;  // the user moves the camera again
       const share = Math.min((performance.now() - start) / MOTION_MS, 1);
       last = share < 1 ? between(from, to, share * share * (3 - 2 * share)) : to;
-      this.homeward = share < 1 ? last : undefined;
+      if (isHomeward) this.homeward = share < 1 ? last : undefined;
       this.setCamera(last);
       if (share < 1) requestAnimationFrame(step);
     };
     step();
+  }
+
+  goHome() {
+    if (!this.vdi || !this.viewer.camera) return;
+    this.pivot = undefined;
+    this.glide(() => this.vdi?.camera, true);
   }
 
   takeTheme() {

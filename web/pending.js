@@ -1,6 +1,8 @@
 // A driver's requests that the simulation hasn't taken yet. It takes them between its steps, which
 // may last minutes.
 
+import {length, minus} from "./vector.js";
+
 /** @typedef {import("./format.js").Camera} Camera */
 /** @typedef {import("./messages.js").Steering} Steering */
 /** @typedef {import("./messages.js").Wish} Wish */
@@ -29,9 +31,9 @@ function requestsOf(wish) {
   const requests = [];
   if (camera) {
     const {position, focalPoint} = /** @type {Camera} */ (camera);
-    const reach = Math.hypot(...position.map((n, i) => n - focalPoint[i]));
+    const reach = length(minus(position, focalPoint));
     const isThere = (/** @type {Camera | undefined} */ at) => at !== undefined &&
-      Math.hypot(...position.map((n, i) => n - at.position[i])) <= TOLERANCE * 10 * reach;
+      length(minus(position, at.position)) <= TOLERANCE * 10 * reach;
     requests.push(["camera", {words: "new view", done: (_, at) => isThere(at)}]);
   }
   if (resolution) requests.push(["resolution", {words: "resolution", done: ({generator}) => areClose(generator?.resolution, resolution)}]);

@@ -2,13 +2,11 @@
 // pixel with the scene cut off behind planes of growing depth.
 
 import {basisOf, halfHeightOf} from "./camera.js";
+import {cornerOf} from "./renderer.js";
 import {dot, length, minus, plus, times} from "./vector.js";
 
 /** @typedef {import("./format.js").Vec3} Vec3 */
 /** @typedef {import("./viewer.js").Viewer} Viewer */
-
-/** @param {[Vec3, Vec3]} bounds @param {number} corner with bits for x, y, z @returns {Vec3} */
-const boxCorner = (bounds, corner) => [bounds[corner & 1][0], bounds[(corner >> 1) & 1][1], bounds[corner >> 2][2]];
 
 const LEAST_ALPHA = 8;  // of 255; below it, a pixel shows nothing
 const HALVINGS = 16;
@@ -37,7 +35,7 @@ export function pointAt(viewer, x, y) {
     renderer.alphaAt(camera, column, row, {origin: at(depth), normal: times(-1, forward)});
 
   const depths = [0, 1, 2, 3, 4, 5, 6, 7].map((corner) =>
-    dot(minus(boxCorner(vdi.bounds, corner), camera.position), forward));
+    dot(cornerOf(vdi.bounds, corner, camera.position), forward));
   const spare = length(minus(vdi.bounds[1], vdi.bounds[0])) * 1e-3;
   let near = Math.max(Math.min(...depths) - spare, camera.parallel ? -Infinity : 0), far = Math.max(...depths) + spare;
   const whole = far > near ? alphaBefore(far) : 0;

@@ -45,9 +45,9 @@ const EDGES = [0, 1, 2].flatMap((axis) => [0, 1, 2, 3].map((i) => {
   return {from, to: from | (1 << axis), faces: [2 * u + (i & 1), 2 * v + (i >> 1)]};
 }));
 
-/** @param {[Vec3, Vec3]} bounds @param {number} corner @param {Vec3} origin */
-function cornerOf(bounds, corner, origin) {
-  return [0, 1, 2].map((axis) => bounds[(corner >> axis) & 1][axis] - origin[axis]);
+/** @param {[Vec3, Vec3]} bounds @param {number} corner with bits for x, y, z @param {Vec3} origin @returns {Vec3} */
+export function cornerOf(bounds, corner, origin) {
+  return /** @type {Vec3} */ ([0, 1, 2].map((axis) => bounds[(corner >> axis) & 1][axis] - origin[axis]));
 }
 
 /**

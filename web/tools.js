@@ -2,7 +2,6 @@
 // clip, turn, record, save pictures, share a link, fill the screen, and read the help.
 
 import {lookingFrom} from "./axes.js";
-import {between} from "./camera.js";
 import {addClipping, planesOf} from "./clip.js";
 import {pointAt} from "./pick.js";
 import {save} from "./picture.js";
@@ -19,6 +18,7 @@ import {addSharing} from "./share.js";
  * @property {() => Vec3} center that the view orbits
  * @property {() => [Vec3, Vec3] | undefined} bounds of the scene
  * @property {(camera: Camera) => void} move
+ * @property {(camera: Camera) => void} glide moves the view there in a third of a second
  * @property {(point: Vec3) => void} orbit sets the point that the view orbits
  * @property {() => string} token of the server; empty without one
  * @property {() => string} viewText the fragment that describes the view
@@ -27,7 +27,6 @@ import {addSharing} from "./share.js";
 
 const TAP_MS = 350;      // between two taps
 const TAP_PIXELS = 24;   // between their places
-const GLIDE_MS = 350;
 const MARK_MS = 1200;
 
 /** @param {string} id */
@@ -60,29 +59,10 @@ export function addTools(page) {
   const {viewer} = page;
   const view = toolOf("view");
 
-  /**
-   * Moves the view there in a third of a second.
-   * @param {Camera} to
-   */
-  const glide = (to) => {
-    const from = viewer.camera;
-    if (!from) return;
-    const start = performance.now();
-    let last = from;
-    const step = () => {
-      if (viewer.camera !== last) return;  // the user moves the camera
-      const share = Math.min((performance.now() - start) / GLIDE_MS, 1);
-      last = share < 1 ? between(from, to, share * share * (3 - 2 * share)) : to;
-      page.move(last);
-      if (share < 1) requestAnimationFrame(step);
-    };
-    step();
-  };
-
   /** @param {string} side */
   const look = (side) => {
     const to = viewer.camera && lookingFrom(viewer.camera, page.center(), side);
-    if (to) glide(to);
+    if (to) page.glide(to);
   };
   for (const place of ["axes", "sides"]) {
     toolOf(place).addEventListener("click", (event) => {

@@ -8,12 +8,37 @@ import tempfile
 import time
 
 
-class Browser:
+class Driven:
+    """What all browsers have in common: `process`, and `value`, which gives the value of a JavaScript expression."""
+
+    def __init__(self, seconds=60):
+        self.seconds = seconds
+        self.profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+
+    def wait(self, expression, seconds=None):
+        """Waits until the expression is true."""
+        until = time.monotonic() + (seconds or self.seconds)
+        while not self.value(expression):
+            if time.monotonic() > until:
+                raise TimeoutError(f"in vain for: {expression}; the page says: "
+                                   + str(self.value("document.getElementById('message')?.textContent")))
+            time.sleep(0.02)
+
+    def end(self):
+        self.process.terminate()
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        self.profile.cleanup()
+
+
+class Browser(Driven):
     """One browser with one page at first. Chromium's GPU is SwiftShader, which runs on the CPU."""
 
     def __init__(self, program, seconds=60):
-        self.seconds = seconds
-        self.profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        super().__init__(seconds)
         to_read, self.write_end = os.pipe()
         self.read_end, to_write = os.pipe()
 
@@ -47,13 +72,7 @@ class Browser:
     def close(self):
         os.close(self.write_end)
         os.close(self.read_end)
-        self.process.terminate()
-        try:
-            self.process.wait(10)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-        self.profile.cleanup()
+        self.end()
 
     def receive(self, until):
         while b"\0" not in self.buffer:
@@ -89,15 +108,6 @@ class Browser:
             details = result["exceptionDetails"]
             raise RuntimeError(details.get("exception", {}).get("description", details["text"]))
         return result["result"].get("value")
-
-    def wait(self, expression, seconds=None):
-        """Waits until the expression is true."""
-        until = time.monotonic() + (seconds or self.seconds)
-        while not self.value(expression):
-            if time.monotonic() > until:
-                raise TimeoutError(f"in vain for: {expression}; the page says: "
-                                   + str(self.value("document.getElementById('message')?.textContent")))
-            time.sleep(0.02)
 
     def size(self, width, height, ratio=1, mobile=False):
         self.send("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=ratio, mobile=mobile)

@@ -77,10 +77,7 @@ def test_small_textures(browser):
     camera = azimuth(camera_of(browser), 30)
     browser.value(f"vdiPage.setCamera({json.dumps(camera)}, false)")
     final(browser)
-    png = browser.value("vdiPage.viewer.screenshot().then((blob) => new Promise((done) => {"
-                        " const reader = new FileReader(); reader.onload = () => done(reader.result.split(',')[1]);"
-                        " reader.readAsDataURL(blob); }))")
-    got = images.imread(io.BytesIO(base64.b64decode(png)))[..., :3]
+    got = png_of(browser, "")[..., :3]
     seen = shown(browser, "small_textures")
     check(got.shape[:2] == (36, 64) and seen.any(), f"the canvas is as large as the GPU allows: {got.shape}, {seen.max()}")
     if failures:
@@ -666,10 +663,7 @@ def test_framing(browser):
             whole(browser)
             browser.value("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
             final(browser)
-            png = browser.value("vdiPage.viewer.screenshot().then((blob) => new Promise((done) => {"
-                                " const reader = new FileReader(); reader.onload = () => done(reader.result.split(',')[1]);"
-                                " reader.readAsDataURL(blob); }))")
-            picture = images.imread(io.BytesIO(base64.b64decode(png)))[..., :3].astype(int)
+            picture = png_of(browser, "")[..., :3].astype(int)
             browser.screenshot(os.path.join(PICTURES, f"framing_{width}_{frame}.png"))
             rows, columns = np.nonzero(np.abs(picture - picture[-1, -1]).max(axis=2) > 8)
             check(np.ptp(columns) > 30 and np.ptp(rows) > 30, f"{width} x {height}: the scene can be seen")

@@ -5,30 +5,18 @@ import json
 import os
 import socket
 import subprocess
-import tempfile
 import time
 import urllib.request
 
+from browser import Driven
 
-class Driven:
+
+class OverWebDriver(Driven):
     """What both have in common. `command` sends a command: its name in Marionette, the end of its address in HTTP."""
-
-    def __init__(self, seconds=60):
-        self.seconds = seconds
-        self.profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
 
     def value(self, expression):
         """The value of a JavaScript expression, or of the promise that it gives, once that is fulfilled."""
         return self.command("ExecuteScript", "execute/sync", script=f"return ({expression});", args=[])
-
-    def wait(self, expression, seconds=None):
-        """Waits until the expression is true."""
-        until = time.monotonic() + (seconds or self.seconds)
-        while not self.value(expression):
-            if time.monotonic() > until:
-                raise TimeoutError(f"in vain for: {expression}; the page says: "
-                                   + str(self.value("document.getElementById('message')?.textContent")))
-            time.sleep(0.05)
 
     def size(self, width, height):
         """Gives the page this size, which is smaller than the window's."""
@@ -50,22 +38,13 @@ class Driven:
                 file.write(data)
         return data
 
-    def end(self, process):
-        process.terminate()
-        try:
-            process.wait(10)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        self.profile.cleanup()
-
 
 SETTINGS = {"marionette.port": 0, "datareporting.policy.dataSubmissionEnabled": False, "app.update.enabled": False,
             "browser.shell.checkDefaultBrowser": False, "browser.startup.homepage_override.mstone": "ignore",
             "webgl.force-enabled": True, "toolkit.startup.max_resumed_crashes": -1}
 
 
-class Firefox(Driven):
+class Firefox(OverWebDriver):
     """Firefox without a window. Its GPU is Mesa's llvmpipe."""
 
     def __init__(self, program):
@@ -79,7 +58,7 @@ class Firefox(Driven):
         try:
             self.connect()
         except BaseException:
-            self.end(self.process)
+            self.end()
             raise
 
     def connect(self):
@@ -117,10 +96,10 @@ class Firefox(Driven):
 
     def close(self):
         self.stream.close()
-        self.end(self.process)
+        self.end()
 
 
-class WebKit(Driven):
+class WebKit(OverWebDriver):
     """GTK's WebKit in its MiniBrowser. `program` is WebKitWebDriver. Its GPU is Mesa's llvmpipe."""
 
     def __init__(self, program, browser):
@@ -137,7 +116,7 @@ class WebKit(Driven):
         try:
             self.connect({"alwaysMatch": options})
         except BaseException:
-            self.end(self.process)
+            self.end()
             raise
 
     def connect(self, capabilities):
@@ -169,4 +148,4 @@ class WebKit(Driven):
 
     def close(self):
         self.send(self.address, None, "DELETE")
-        self.end(self.process)
+        self.end()

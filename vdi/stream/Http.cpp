@@ -92,22 +92,16 @@ std::string queryField(std::string_view target, std::string_view name) {
   constexpr int hex = 16;
   std::string_view query = target.substr(pathOf(target).size());
   query.remove_prefix(std::min<std::size_t>(query.size(), 1));
-  while (!query.empty()) {
-    const std::string_view part = query.substr(0, query.find('&'));
-    query.remove_prefix(std::min(part.size() + 1, query.size()));
-    if (!part.starts_with(name) || part.substr(name.size()).substr(0, 1) != "=") continue;
-    std::string value;
-    for (std::string_view rest = part.substr(name.size() + 1); !rest.empty();) {
-      unsigned char code = 0;
-      const char* const digits = rest.data() + 1;
-      const bool isCoded = rest.size() > 2 && rest.front() == '%' &&
-                           std::from_chars(digits, digits + 2, code, hex).ptr == digits + 2;
-      value += isCoded ? static_cast<char>(code) : rest.front();
-      rest.remove_prefix(isCoded ? 3 : 1);
-    }
-    return value;
+  std::string value;
+  for (std::string_view rest = fieldOf(query, name); !rest.empty();) {
+    unsigned char code = 0;
+    const char* const digits = rest.data() + 1;
+    const bool isCoded = rest.size() > 2 && rest.front() == '%' &&
+                         std::from_chars(digits, digits + 2, code, hex).ptr == digits + 2;
+    value += isCoded ? static_cast<char>(code) : rest.front();
+    rest.remove_prefix(isCoded ? 3 : 1);
   }
-  return {};
+  return value;
 }
 
 Site::Site(SiteOptions options)
@@ -167,8 +161,7 @@ HttpReply Site::reply(const HttpRequest& request) {
     reply.set(http::field::www_authenticate, "Bearer");
     return reply;
   }
-  const std::string_view resource = target.substr(0, target.find('?'));
-  if (!reads && (resource == "/" || resource == "/status" || resource == "/stream")) {
+  if (!reads && (path == "/" || path == "/status" || path == "/stream")) {
     HttpReply reply = replyTo(request, http::status::method_not_allowed, "text/plain; charset=utf-8",
                               "this server only answers GET and HEAD\n");
     reply.set(http::field::allow, "GET, HEAD");

@@ -47,16 +47,6 @@ bool isTarget(std::string_view text) {
   return std::ranges::all_of(text, [](char c) { return c >= firstVisible && c <= lastVisible; });
 }
 
-std::string tokenOf(std::string_view fragment) {
-  constexpr std::string_view name = "token=";
-  while (!fragment.empty()) {
-    const std::size_t end = std::min(fragment.find('&'), fragment.size());
-    if (fragment.starts_with(name)) return std::string(fragment.substr(name.size(), end - name.size()));
-    fragment.remove_prefix(std::min(end + 1, fragment.size()));
-  }
-  return {};
-}
-
 }  // namespace
 
 std::string Url::authority() const {
@@ -86,8 +76,18 @@ Url parseUrl(std::string_view text) {
   }
   url.folder = rest.substr(slash);
   if (!url.folder.ends_with('/')) url.folder += '/';
-  url.token = tokenOf(text.substr(hash).substr(hash < text.size() ? 1 : 0));
+  url.token = fieldOf(text.substr(hash).substr(hash < text.size() ? 1 : 0), "token");
   return url;
+}
+
+std::string_view fieldOf(std::string_view fields, std::string_view name) {
+  while (!fields.empty()) {
+    const std::string_view part = fields.substr(0, fields.find('&'));
+    fields.remove_prefix(std::min(part.size() + 1, fields.size()));
+    if (part.starts_with(name) && part.substr(name.size()).starts_with('='))
+      return part.substr(name.size() + 1);
+  }
+  return {};
 }
 
 bool isOrigin(std::string_view text) {

@@ -26,6 +26,9 @@ struct Url {
 /// that omits the link's query and fragment.
 Url parseUrl(std::string_view text);
 
+/// The value of the first field of that name in "name=value&name=value", not decoded; empty: it has none.
+std::string_view fieldOf(std::string_view fields, std::string_view name);
+
 /// Whether the text is an origin as browsers send it: "https://example.org" or "http://127.0.0.1:8080", in
 /// lower case, without a path and without the usual port.
 bool isOrigin(std::string_view text);
