@@ -98,16 +98,18 @@ for frequency, deferred in ((20, second), (30, third)):
     check(np.shape(deferred) == np.shape(codes(image)) and same(deferred, codes(image)),
           "the same VDI is made in place, at frequency %d" % frequency)
 
-# With each request, ParaView's own filters hand the same AMR blocks over in another data set.
-image.SMProxy.InvokeCommand("DeferViews")
-image.Input = simple.AMRGaussianPulseSource()
-image.SelectInputScalars = ["CELLS", "Gaussian-Pulse"]
-simple.Render(view)
-check(prepare(image) == 100, "the VDI of AMR data is prepared")
-release_and_render(image, view)
-check(asked(image, "Outdated") == 0, "the prepared VDI of AMR data is shown")
-image.SMProxy.InvokeCommand("DeferNoViews")
-image.SelectInputScalars = ["POINTS", "RTData"]
+# With each request, ParaView's own filters hand the same AMR blocks over in another data set. The source gives each rank
+# all blocks, and two ranks may not have the same ones.
+if simple.servermanager.ActiveConnection.GetNumberOfDataPartitions() == 1:
+    image.SMProxy.InvokeCommand("DeferViews")
+    image.Input = simple.AMRGaussianPulseSource()
+    image.SelectInputScalars = ["CELLS", "Gaussian-Pulse"]
+    simple.Render(view)
+    check(prepare(image) == 100, "the VDI of AMR data is prepared")
+    release_and_render(image, view)
+    check(asked(image, "Outdated") == 0, "the prepared VDI of AMR data is shown")
+    image.SMProxy.InvokeCommand("DeferNoViews")
+    image.SelectInputScalars = ["POINTS", "RTData"]
 
 # Time steps: the view asks for them, and only its update tells others.
 steps = simple.ProgrammableFilter(Input=wavelet, CopyArrays=0, RequestInformationScript=STEPS, Script=SCALED)
