@@ -105,17 +105,17 @@ struct Segment {
   }
 };
 
-/// Cuts the segment where a straight line differs from it by more than `tolerance` of the extinction.
-void addStretches(const Segment& segment, double first, double last, double tolerance, int levels,
+/// Cuts the segment where a straight line differs from it by more than `allowed` of the extinction.
+void addStretches(const Segment& segment, double first, double last, double allowed, int levels,
                   std::vector<Stretch>& stretches) {
   const glm::dvec4 front = segment.entryAt(first);
   const glm::dvec4 back = segment.entryAt(last);
   const glm::dvec4 middle = segment.entryAt(0.5 * (first + last));
   const glm::dvec4 off = glm::abs(0.5 * (front + back) - middle);
-  const bool isStraight = std::max({off.r, off.g, off.b, off.a}) <= tolerance * (middle.a + 1e-3);
+  const bool isStraight = std::max({off.r, off.g, off.b, off.a}) <= allowed * (middle.a + 1e-3);
   if (!isStraight && levels > 0) {
-    addStretches(segment, first, 0.5 * (first + last), tolerance, levels - 1, stretches);
-    addStretches(segment, 0.5 * (first + last), last, tolerance, levels - 1, stretches);
+    addStretches(segment, first, 0.5 * (first + last), allowed, levels - 1, stretches);
+    addStretches(segment, 0.5 * (first + last), last, allowed, levels - 1, stretches);
     return;
   }
   const auto at = [&](double share) { return segment.from + (segment.to - segment.from) * share; };
@@ -145,13 +145,13 @@ std::vector<Stretch> stretchesOf(const TransferFunction& function) {
   constexpr int levels = 32;
   std::vector<Stretch> stretches;
   for (int attempt = 0; attempt < 5; ++attempt) {
-    const double tolerance = 0.002 * std::pow(4.0, attempt);
+    const double allowed = 0.002 * std::pow(4.0, attempt);
     stretches.clear();
     for (std::size_t i = 0; i + 1 < xs.size() && stretches.size() <= most; ++i) {
       const Segment segment{xs[i], xs[i + 1], glm::dvec4(function.colorAt(xs[i]), function.opacityAt(xs[i])),
                             glm::dvec4(inFrontOf(function.colors, xs[i + 1], colorOf),
                                        inFrontOf(function.opacities, xs[i + 1], opacityOf))};
-      addStretches(segment, 0.0, 1.0, tolerance, levels, stretches);
+      addStretches(segment, 0.0, 1.0, allowed, levels, stretches);
     }
     if (stretches.size() <= most) break;
   }
