@@ -42,32 +42,32 @@ struct RenderOptions {
 };
 
 /// One of the pictures to render.
-struct Shot {
+struct Pose {
   double azimuth = 0.0;
   std::filesystem::path path;  // empty: only for the movie
 };
 
 /// With several azimuths, the degrees become part of the pictures' names, and in an orbit their numbers.
-std::vector<Shot> shotsOf(const RenderOptions& options) {
+std::vector<Pose> posesOf(const RenderOptions& options) {
   constexpr double turn = 360.0;
-  std::vector<Shot> shots;
-  shots.reserve(static_cast<std::size_t>(std::max(options.orbit, 0)));
+  std::vector<Pose> poses;
+  poses.reserve(static_cast<std::size_t>(std::max(options.orbit, 0)));
   for (int i = 0; i < options.orbit; ++i) {
-    shots.push_back({options.azimuths.front() + turn * i / options.orbit,
+    poses.push_back({options.azimuths.front() + turn * i / options.orbit,
                      options.output.empty() ? "" : withSuffix(options.output, fmt::format("{:04}", i))});
   }
-  if (options.orbit > 0) return shots;
+  if (options.orbit > 0) return poses;
   for (const double azimuth : options.azimuths) {
-    shots.push_back({azimuth, options.azimuths.size() == 1
+    poses.push_back({azimuth, options.azimuths.size() == 1
                                   ? std::filesystem::path(options.output)
                                   : withSuffix(options.output, fmt::format("{:g}deg", azimuth))});
   }
-  return shots;
+  return poses;
 }
 
 void requirePictures(const RenderOptions& options) {
   std::vector<NamedFile> outputs;
-  for (const Shot& shot : shotsOf(options)) {
+  for (const Pose& shot : posesOf(options)) {
     if (!shot.path.empty())
       outputs.push_back({fmt::format("the picture at {} degrees", shot.azimuth), shot.path});
   }
@@ -81,7 +81,7 @@ class Painter {
   explicit Painter(const RenderOptions& options)
       : options_(options),
         reconstruction_(reconstructionFromString(options.reconstruction)),
-        shots_(shotsOf(options)),
+        poses_(posesOf(options)),
         renderer_(gpu::Device::create(gpu::requestFromEnvironment(0))) {
     renderer_.setClipPlanes(makeClipPlanes(options.clip));
   }
@@ -94,7 +94,7 @@ class Painter {
     const Camera start = chosenCamera(options_.camera, vdi.camera);
     std::optional<Movie> movie;
     if (!options_.movie.empty()) movie.emplace(options_.movie, size[0], size[1], options_.rate);
-    for (const auto& [azimuth, path] : shots_) {
+    for (const auto& [azimuth, path] : poses_) {
       const Camera camera = turned(start, azimuth, options_.elevation);
       const auto issue = viewpointIssue(vdi.bounds, vdi.view(), View(camera, size[0], size[1]));
       if (issue && warned_.insert(*issue).second)
@@ -108,13 +108,13 @@ class Painter {
     }
     if (!movie) return;
     movie->finish();
-    fmt::print("{}: {} pictures\n", printable(options_.movie), shots_.size());
+    fmt::print("{}: {} pictures\n", printable(options_.movie), poses_.size());
   }
 
  private:
   const RenderOptions& options_;
   Reconstruction reconstruction_;
-  std::vector<Shot> shots_;
+  std::vector<Pose> poses_;
   VdiRenderer renderer_;
   std::set<ViewpointIssue> warned_;
 };
