@@ -723,14 +723,17 @@ def test_opening(browser):
     sources = browser.value("""(async () => {
       const {source, decoder} = vdiPage, {decode} = decoder;
       const file = (name, bytes) => new File([bytes], name);
+      let begun;
+      const decoding = new Promise((done) => { begun = done; });
       decoder.decode = async (encoded, isWanted) => {
+        begun();
         await new Promise((done) => setTimeout(done, 200));
         if (!isWanted()) window.isAbandoned = true;
         return decode.call(decoder, encoded, isWanted);
       };
       const bytes = await decodeText();
       const slow = vdiPage.openFiles([file('slow.vdi', bytes)]);
-      await new Promise((done) => setTimeout(done, 50));
+      await decoding;
       await vdiPage.openFiles([file('wrong.vdi', 'wrong')]);
       const said = message.textContent;
       await slow;

@@ -62,8 +62,8 @@ struct TransferPiece {
   bool operator==(const TransferPiece&) const = default;
 };
 
-/// Beyond any position: the first piece starts, and the last one ends, that far from 0. Also the limit of
-/// tablePosition in shaders/raycast.glsl.
+/// Beyond any position: the first piece starts, and the last one ends, that far from 0. Also the limit of the
+/// device's positions.
 inline constexpr double farPosition = 1e30;
 
 /// The index of the piece at a position. Requires pieces.
@@ -72,7 +72,7 @@ std::size_t pieceAt(const std::vector<TransferPiece>& pieces, double position);
 /// The function as lookups read it, in one of two forms. Both are constant outside the nodes.
 ///
 /// - Entries: even samples from `min` to `max`, linear in between. Most functions have this form. A lookup of
-///   the device is one filtered fetch (core/SlabTable.h).
+///   the device is one filtered fetch.
 /// - Pieces: stretches of any length, for functions with features that even samples can't resolve, such as
 ///   steps at large label ids, ramps of 1e-5 of the range, or many decades. A lookup searches the pieces.
 ///
