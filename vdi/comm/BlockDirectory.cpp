@@ -4,18 +4,24 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <map>
+#include <mutex>
 #include <numeric>
 #include <tuple>
 
 #include "vdi/core/Error.h"
+#include "vdi/core/Parallel.h"
 
 namespace vdi::comm {
 
 namespace {
+
+/// Finding a block's neighbours takes a few microseconds.
+constexpr std::size_t blocksPerThread = 32;
 
 /// Owned boxes of point data end at values, those of cell data half-way between two.
 bool isOfCells(const Block& block) {
@@ -202,16 +208,22 @@ void BlockDirectory::growOverGaps(const Communicator& comm) {
   std::vector<Box> grown;
   std::array<std::uint64_t, 1> any{0};
   comm.together([&] {
-    for (std::size_t i = firstMine_; i < lastMine_; ++i) {
-      Box& box = grown.emplace_back(entries_[i].owned);
-      for (int axis = 0; axis < 3 && !entries_[i].cells; ++axis) {
-        for (const bool above : {false, true}) {
-          const double gap = gapBeside(i, box, axis, above);
-          if (gap > 0.0) any[0] = 1;
-          (above ? box.hi : box.lo)[axis] += above ? gap : -gap;
+    grown.resize(lastMine_ - firstMine_);
+    std::atomic<bool> found{false};
+    inParallel(grown.size(), blocksPerThread, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) {
+        const BlockEntry& entry = entries_[firstMine_ + i];
+        Box& box = grown[i] = entry.owned;
+        for (int axis = 0; axis < 3 && !entry.cells; ++axis) {
+          for (const bool above : {false, true}) {
+            const double gap = gapBeside(firstMine_ + i, box, axis, above);
+            if (gap > 0.0) found = true;
+            (above ? box.hi : box.lo)[axis] += above ? gap : -gap;
+          }
         }
       }
-    }
+    });
+    any[0] = found ? 1 : 0;
   });
   comm.allReduceMax(any);
   if (any[0] == 0) return;
@@ -250,10 +262,11 @@ std::vector<OwnParts> settleOverlaps(const Communicator& comm, const BlockDirect
   const std::span<const BlockEntry> entries = directory.entries();
   std::vector<OwnParts> parts;
   std::array<std::uint64_t, 1> conflict{0};  // complement of the first conflicting pair; 0: none
-  comm.together([&] {
-    for (std::size_t i = directory.firstMine(); i < directory.lastMine(); ++i) {
+  std::mutex conflictMutex;
+  const auto settle = [&](std::size_t first, std::size_t last) {
+    for (std::size_t i = directory.firstMine() + first; i < directory.firstMine() + last; ++i) {
       const BlockEntry& own = entries[i];
-      OwnParts& left = parts.emplace_back();
+      OwnParts& left = parts[i - directory.firstMine()];
       for (const std::size_t j : directory.meeting(own.owned)) {
         const BlockEntry& other = entries[j];
         const glm::dvec3 tolerance = toleranceOf(own, other);
@@ -261,6 +274,7 @@ std::vector<OwnParts> settleOverlaps(const Communicator& comm, const BlockDirect
         const LevelOrder order = levelOrderOf(other, own);
         if (order == LevelOrder::Same && overlapBy(own.asked, other.asked, tolerance)) {
           const std::uint64_t pair = std::min(i, j) * entries.size() + std::max(i, j);
+          const std::lock_guard lock(conflictMutex);
           conflict[0] = std::max(conflict[0], ~pair);
         }
         // If two blocks of one level have closed a gap, the first one keeps the common part.
@@ -269,6 +283,10 @@ std::vector<OwnParts> settleOverlaps(const Communicator& comm, const BlockDirect
       }
       left.boxes = withoutAll(own.owned, left.finer);
     }
+  };
+  comm.together([&] {
+    parts.resize(directory.lastMine() - directory.firstMine());
+    inParallel(parts.size(), blocksPerThread, settle);
   });
   comm.allReduceMax(conflict);
   if (conflict[0] != 0) {

@@ -58,6 +58,9 @@ AnyBox columnOf(const AnyBox& stored, const AnyBox& core, int axis) {
   return column;
 }
 
+/// A grid's neighbours and patches take some 30 us.
+constexpr std::size_t gridsPerThread = 8;
+
 /// A question of one rank to another, or to itself. For each value in `box` of a lattice, it asks for the sum
 /// over those of the value's samples that lie in `clip`, [lo, hi). A value's samples are the middles of its
 /// parts. A block may need hundreds of questions.
@@ -119,6 +122,13 @@ struct Request : Question {
   }
 };
 
+/// A question with what it is for.
+struct Asked {
+  Question question;
+  std::int32_t grid;  // the asking grid
+  std::int32_t wanted;
+};
+
 /// Values that a grid lacks, or has but should not use.
 struct Wanted {
   IndexBox box;
@@ -144,7 +154,8 @@ struct Grid {
   std::vector<Box> finer;       // parts that finer blocks took over
   std::vector<IndexBox> given;  // its own values
   std::vector<Wanted> wanted;
-  IndexBox asked;               // bounds of all values that other blocks have
+  IndexBox asked;                                         // bounds of all values that other blocks have
+  std::vector<std::pair<std::int32_t, Asked>> questions;  // each with the rank that answers
   std::vector<OpenPatch> open;  // places where values are continued beyond the domain's faces
   bool stale = true;            // values have arrived since the last continuation
 };
@@ -222,15 +233,13 @@ class LayerExchange {
         outgoing_(static_cast<std::size_t>(comm.size())) {
     findLevels();
     gatherGrids(parts);
-    for (std::size_t i = 0; i < grids_.size(); ++i) {
-      findWanted(grids_[i]);
-      for (std::size_t w = 0; w < grids_[i].wanted.size(); ++w) askFor(i, w);
-    }
-    for (Grid& grid : grids_) grid.stored = storedOnly(grid.block);
-    for (std::size_t i = 0; i < grids_.size(); ++i) {
-      makePatches(i);
-      noteOwnValues(grids_[i]);
-    }
+    findQuestions();
+    inParallel(grids_.size(), gridsPerThread, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) {
+        makePatches(i);
+        noteOwnValues(grids_[i]);
+      }
+    });
     rounds_.resize(levels_.size() + firstCoarserRound);
     for (const auto& asked : outgoing_) {
       for (const Asked& one : asked) {
@@ -269,12 +278,6 @@ class LayerExchange {
   static constexpr std::int32_t exactRound = 0;
   static constexpr std::int32_t interpolatedRound = 1;
   static constexpr std::int32_t firstCoarserRound = 2;
-
-  struct Asked {
-    Question question;
-    std::int32_t grid;  // the asking grid
-    std::int32_t wanted;
-  };
 
   void findLevels() {
     for (const BlockEntry& entry : directory_.entries()) levels_.push_back(entry.valueVolume());
@@ -359,6 +362,27 @@ class LayerExchange {
         want(values, false);
         grid.wanted.back().edges.push_back(values);
       }
+    }
+  }
+
+  /// Threads share the grids. The questions stay in the grids' order.
+  void findQuestions() {
+    inParallel(grids_.size(), gridsPerThread, [&](std::size_t first, std::size_t last) {
+      for (std::size_t i = first; i < last; ++i) {
+        Grid& grid = grids_[i];
+        findWanted(grid);
+        for (std::size_t w = 0; w < grid.wanted.size(); ++w) askFor(i, w);
+        grid.stored = storedOnly(grid.block);
+      }
+    });
+    for (Grid& grid : grids_) {
+      for (const auto& [rank, asked] : grid.questions) {
+        std::vector<Asked>& questions = outgoing_[static_cast<std::size_t>(rank)];
+        if (rank == comm_.rank())
+          grid.wanted[static_cast<std::size_t>(asked.wanted)].questions.push_back(questions.size());
+        questions.push_back(asked);
+      }
+      grid.questions = {};
     }
   }
 
@@ -495,9 +519,8 @@ class LayerExchange {
       wanted.sums.assign(wanted.box.count(), 0.0);
       wanted.weights.assign(wanted.box.count(), 0.0);
     }
-    if (donor.rank == comm_.rank()) wanted.questions.push_back(mine().size());
-    outgoing_[static_cast<std::size_t>(donor.rank)].push_back(
-        {request, static_cast<std::int32_t>(gridIndex), static_cast<std::int32_t>(wantedIndex)});
+    grid.questions.emplace_back(donor.rank, Asked{request, static_cast<std::int32_t>(gridIndex),
+                                                  static_cast<std::int32_t>(wantedIndex)});
   }
 
   /// This rank's questions to itself.

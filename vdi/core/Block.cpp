@@ -23,8 +23,8 @@ namespace {
 constexpr std::array<std::pair<const char*, std::size_t>, 8> scalarTypes{
     {{"u8", 1}, {"i8", 1}, {"u16", 2}, {"i16", 2}, {"u32", 4}, {"i32", 4}, {"f32", 4}, {"f64", 8}}};
 
-/// This loop is written so that compilers vectorise it. It runs for every value of every step; a loop with a
-/// branch and one pair of bounds would take several times as long as the upload.
+/// These loops are written so that compilers vectorise them. They run for every value of every step; a loop
+/// with a branch and one pair of bounds would take several times as long as the upload.
 template <typename T>
 class Extremes {
  public:
@@ -33,26 +33,10 @@ class Extremes {
     maximum_.fill(Limits::lowest());
   }
   void include(std::span<const T> values) {
-    std::array<T, lanes> minimum = minimum_;
-    std::array<T, lanes> maximum = maximum_;
-    const auto take = [&](std::size_t lane, T value) {
-      T low = value;
-      T high = value;
-      if constexpr (std::is_floating_point_v<T>) {
-        const bool finite = std::abs(value) <= Limits::max();
-        low = finite ? value : Limits::max();
-        high = finite ? value : Limits::lowest();
-      }
-      minimum[lane] = low < minimum[lane] ? low : minimum[lane];
-      maximum[lane] = high > maximum[lane] ? high : maximum[lane];
-    };
-    std::size_t i = 0;
-    for (; i + lanes <= values.size(); i += lanes) {
-      for (std::size_t lane = 0; lane < lanes; ++lane) take(lane, values[i + lane]);
-    }
-    for (; i < values.size(); ++i) take(0, values[i]);
-    minimum_ = minimum;
-    maximum_ = maximum;
+    // A comparison with NaN is false, so only infinite values need more care, and they are rare.
+    constexpr std::size_t many = 8192;  // fit the cache, if they must be read again
+    for (; values.size() > many; values = values.subspan(many)) includeAtOnce(values.first(many));
+    includeAtOnce(values);
   }
   ScalarRange range() const {
     const T low = *std::min_element(minimum_.begin(), minimum_.end());
@@ -64,8 +48,42 @@ class Extremes {
  private:
   using Limits = std::numeric_limits<T>;
   static constexpr std::size_t lanes = 64 / sizeof(T);
-  std::array<T, lanes> minimum_;
-  std::array<T, lanes> maximum_;
+  using Lanes = std::array<T, lanes>;
+
+  void includeAtOnce(std::span<const T> values) {
+    Lanes minimum = minimum_;
+    Lanes maximum = maximum_;
+    const auto each = [values](auto take) {
+      std::size_t i = 0;
+      for (; i + lanes <= values.size(); i += lanes) {
+        for (std::size_t lane = 0; lane < lanes; ++lane) take(lane, values[i + lane]);
+      }
+      for (; i < values.size(); ++i) take(0, values[i]);
+    };
+    each([&](std::size_t lane, T value) {
+      minimum[lane] = value < minimum[lane] ? value : minimum[lane];
+      maximum[lane] = value > maximum[lane] ? value : maximum[lane];
+    });
+    if constexpr (std::is_floating_point_v<T>) {
+      const auto isInfinite = [](T value) { return std::isinf(value); };
+      if (std::ranges::any_of(minimum, isInfinite) || std::ranges::any_of(maximum, isInfinite)) {
+        minimum = minimum_;
+        maximum = maximum_;
+        each([&](std::size_t lane, T value) {
+          const bool finite = std::abs(value) <= Limits::max();
+          const T low = finite ? value : Limits::max();
+          const T high = finite ? value : Limits::lowest();
+          minimum[lane] = low < minimum[lane] ? low : minimum[lane];
+          maximum[lane] = high > maximum[lane] ? high : maximum[lane];
+        });
+      }
+    }
+    minimum_ = minimum;
+    maximum_ = maximum;
+  }
+
+  Lanes minimum_;
+  Lanes maximum_;
 };
 
 }  // namespace
@@ -214,9 +232,11 @@ void forEachSpan(const Block& block, const IndexBox& tile, TileBuffer& buffer, I
     return include(std::span(reinterpret_cast<const T*>(buffer.bytes.data()), tile.count()));
   }
   const auto* values = static_cast<const T*>(block.data);
-  const auto length = static_cast<std::size_t>(tile.size().x);
+  const bool wholeRows = tile.size().x == block.dims.x;  // those of a slice follow each other
+  const int rows = wholeRows ? tile.size().y : 1;
+  const auto length = static_cast<std::size_t>(tile.size().x) * static_cast<std::size_t>(rows);
   for (int z = tile.lo.z; z < tile.hi.z; ++z) {
-    for (int y = tile.lo.y; y < tile.hi.y; ++y)
+    for (int y = tile.lo.y; y < tile.hi.y; y += rows)
       include(std::span(values + block.stored().position({tile.lo.x, y, z}), length));
   }
 }

@@ -67,16 +67,21 @@ double interpolated(const Block& block, const glm::dvec3& world) {
   return sum;
 }
 
-/// Whether the block owns a place, by the rule for samples (snapToScene), which gives each place one owner.
-bool owns(const Scene& scene, const Block& block, const glm::dvec3& center) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto at = static_cast<float>(center[axis]);
-    if (at < snapToScene(scene, block.owned.lo[axis], axis) ||
-        at >= snapToScene(scene, block.owned.hi[axis], axis))
-      return false;
+/// The faces of a block's owned box by the rule for samples (snapToScene), which gives each place one owner.
+struct SnappedBox {
+  glm::vec3 lo{0.0F};
+  glm::vec3 hi{0.0F};
+
+  SnappedBox(const Scene& scene, const Box& owned) {
+    for (int axis = 0; axis < 3; ++axis) {
+      lo[axis] = snapToScene(scene, owned.lo[axis], axis);
+      hi[axis] = snapToScene(scene, owned.hi[axis], axis);
+    }
   }
-  return true;
-}
+  bool contains(const glm::vec3& center) const {
+    return glm::all(glm::greaterThanEqual(center, lo)) && glm::all(glm::lessThan(center, hi));
+  }
+};
 
 double nearest(const Block& block, const glm::dvec3& world) {
   const IndexBox all = block.extended();
@@ -181,8 +186,10 @@ std::vector<Probe> probesOf(const Scene& scene, std::span<const Block> blocks) {
     };
     const auto first = std::ranges::lower_bound(places, at(block.owned.lo.x - spare), isBefore);
     const auto last = std::ranges::upper_bound(places, at(block.owned.hi.x + spare), isBefore);
+    const SnappedBox box(scene, block.owned);
     for (auto place = first; place < last; ++place) {
-      if (owns(scene, block, place->first.center)) owned.push_back({&block, place->second, place->first});
+      if (box.contains(glm::vec3(place->first.center)))
+        owned.push_back({&block, place->second, place->first});
     }
   }
   std::ranges::sort(owned, {}, &Owned::index);

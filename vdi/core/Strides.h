@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <glm/glm.hpp>
+#include <utility>
 
 #include "vdi/core/Box.h"
 
@@ -117,11 +118,18 @@ inline void copyStrided(const void* from, const ByteStrides& fromStrides, void* 
   auto* target = static_cast<std::byte*>(to);
   const auto bytes = static_cast<std::int64_t>(valueBytes);
   if (size.x == 1 || (fromStrides.x == bytes && toStrides.x == bytes)) {
-    for (int z = 0; z < size.z; ++z) {
-      for (int y = 0; y < size.y; ++y) {
+    // Rows that follow each other on both sides are one long row, and so are slices of such rows.
+    std::int64_t row = size.x * bytes;
+    int rows = size.y;
+    int slices = size.z;
+    if (fromStrides.y == row && toStrides.y == row) {
+      row *= std::exchange(rows, 1);
+      if (fromStrides.z == row && toStrides.z == row) row *= std::exchange(slices, 1);
+    }
+    for (int z = 0; z < slices; ++z) {
+      for (int y = 0; y < rows; ++y) {
         std::memcpy(target + y * toStrides.y + z * toStrides.z,
-                    source + y * fromStrides.y + z * fromStrides.z,
-                    static_cast<std::size_t>(size.x) * valueBytes);
+                    source + y * fromStrides.y + z * fromStrides.z, static_cast<std::size_t>(row));
       }
     }
     return;
