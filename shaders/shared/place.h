@@ -17,7 +17,7 @@ VDI_CONST uint placeI16 = 3;
 VDI_CONST uint placeU32 = 4;
 VDI_CONST uint placeI32 = 5;
 VDI_CONST uint placeF32 = 6;
-VDI_CONST uint placeF64 = 7;
+VDI_CONST uint placeTexel = 7;  // texels of another box, with the same scale and offset, instead of values
 
 VDI_SHARED_END
 
@@ -38,6 +38,8 @@ struct PlaceJob {
   uint type;
   uvec3 place;  // in the page, texels
   uint page;
+  uvec3 from;  // of the other box, if the type is placeTexel
+  uint fromPage;
   uint firstGroup;  // the first of the job's workgroups
   uint pad;
 };

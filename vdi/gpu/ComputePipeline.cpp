@@ -20,6 +20,7 @@ ComputePipeline::ComputePipeline(std::shared_ptr<Device> device, const ComputePi
     : device_(std::move(device)),
       compiled_(device_->vulkan().compiled(info, device_->limits().subgroupSize)),
       imageCount_(info.imageCount),
+      storeCount_(info.storeCount),
       uniformBytes_(info.uniformBytes),
       hasPlane_(info.hasPlane) {
   assert(info.pushConstantBytes <= guaranteedPushConstantBytes);
@@ -54,7 +55,8 @@ void ComputePipeline::makeDescriptorSet(const ComputePipelineInfo& info) {
 
 void ComputePipeline::bindImages(std::span<const SampledImage* const> images, const Sampler& sampler) {
   assert(images.size() == imageCount_);
-  bind(descriptorImages, images, sampler);
+  bind(descriptorImages, images, sampler,
+       storeCount_ > 0 ? VK_IMAGE_LAYOUT_GENERAL : VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
 }
 
 void ComputePipeline::bindStores(std::span<const SampledImage* const> images) {
@@ -67,14 +69,13 @@ void ComputePipeline::bindStores(std::span<const SampledImage* const> images) {
 void ComputePipeline::bindPlane(const SampledImage& image, const Sampler& sampler) {
   assert(hasPlane_);
   const SampledImage* const images[] = {&image};
-  bind(descriptorPlane, images, sampler);
+  bind(descriptorPlane, images, sampler, VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL);
 }
 
 void ComputePipeline::bind(std::uint32_t binding, std::span<const SampledImage* const> images,
-                           const Sampler& sampler) {
+                           const Sampler& sampler, VkImageLayout layout) {
   std::vector<VkDescriptorImageInfo> infos;
-  for (const SampledImage* image : images)
-    infos.push_back({sampler.handle(), image->view(), VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL});
+  for (const SampledImage* image : images) infos.push_back({sampler.handle(), image->view(), layout});
   write(binding, VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, infos);
 }
 

@@ -28,7 +28,8 @@ class ComputePipeline {
   ComputePipeline& operator=(ComputePipeline&&) = delete;
 
   /// Writes the descriptor set: exactly imageCount images. Must not be called while a dispatch of this
-  /// pipeline is in flight.
+  /// pipeline is in flight. A shader that also stores to images samples these in the layout of its stores
+  /// (Commands::beginStores).
   void bindImages(std::span<const SampledImage* const> images, const Sampler& sampler);
   /// Writes the descriptors of the images to which the shader stores, exactly storeCount, under the same
   /// condition.
@@ -44,13 +45,15 @@ class ComputePipeline {
 
  private:
   void makeDescriptorSet(const ComputePipelineInfo& info);
-  void bind(std::uint32_t binding, std::span<const SampledImage* const> images, const Sampler& sampler);
+  void bind(std::uint32_t binding, std::span<const SampledImage* const> images, const Sampler& sampler,
+            VkImageLayout layout);
   void write(std::uint32_t binding, VkDescriptorType type, std::span<const VkDescriptorImageInfo> infos);
   void release() noexcept;
 
   std::shared_ptr<Device> device_;
   std::shared_ptr<const CompiledPipeline> compiled_;
   std::uint32_t imageCount_ = 0;
+  std::uint32_t storeCount_ = 0;
   std::uint32_t uniformBytes_ = 0;
   bool hasPlane_ = false;
   VkDescriptorPool pool_ = VK_NULL_HANDLE;

@@ -15,7 +15,8 @@ namespace vdi::gpu {
 
 /// All cores copy values into a ring of slots in host memory as the simulation stores them. The device's
 /// transfer queue moves each filled slot to the device, where a shader turns the values into texels and puts
-/// them in place. A copy of host memory to a texture would instead pay for each row of a block.
+/// them in place. A copy of host memory to a texture would instead pay for each row of a block. Layers that
+/// another block of the rank has are copied from its texels, if both have the same scale and offset.
 ///
 /// A CPU device, and one that cannot store texels, gets texels that the host has made, and copies them.
 /// If values can be texels as they are and the driver can import host memory
@@ -53,13 +54,16 @@ class VolumeUpload {
   void makeSlots(const Plan& plan);
   void send(const Plan& plan, std::span<const SampledImage> pages);
   void submit(const Plan& plan, const Batch& batch, Slot& slot, std::span<const SampledImage> pages);
+  void copyLayers(const Plan& plan);
 
   std::shared_ptr<Device> device_;
-  bool places_;            // whether a shader places the values
-  Commands frame_;         // what comes before and after the slots' commands
+  bool places_;     // whether a shader places the values
+  Commands frame_;  // what comes before and after the slots' commands
+  Sampler sampler_;
   PipelineSet pipelines_;  // by page count
   ComputePipeline* pipeline_ = nullptr;
   std::vector<std::unique_ptr<Slot>> slots_;
+  Buffer layerJobs_;
 };
 
 }  // namespace vdi::gpu
