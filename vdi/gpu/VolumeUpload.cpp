@@ -193,7 +193,8 @@ class LayerSources {
   }
 
  private:
-  using Key = std::tuple<const void*, std::array<std::int64_t, 3>, std::array<int, 3>, std::array<double, 6>>;
+  using Key = std::tuple<const void*, const void*, std::array<std::int64_t, 3>, std::array<int, 3>,
+                         std::array<double, 6>>;
   struct Source {
     std::vector<const VolumePiece*> pieces;
     std::vector<IndexBox> covered;  // stored values that patches replace
