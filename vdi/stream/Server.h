@@ -25,8 +25,8 @@ struct ServerOptions {
   std::vector<std::string> embedders;  // origins of sites that may show the page in a frame
   double mostBytesPerSecond = 0.0;     // to each viewer; 0: no limit
   std::uint32_t mostViewers = 64;
-  /// The most bytes of frames kept only because viewers still need them, without the newest frame. Beyond it,
-  /// the viewer that has taken nothing for longest is disconnected.
+  /// Upper bound on the bytes of superseded frames held for slow viewers. Beyond it, the server disconnects
+  /// the viewer that has taken nothing for longest.
   std::uint64_t mostHeldBytes = std::uint64_t{1} << 30;
   std::uint32_t mostConnections = 256;  // of any kind, viewers included
   std::filesystem::path certificate;    // PEM, a chain; empty: no TLS

@@ -182,7 +182,7 @@ void Viewer::refuse(Close code, std::string cause) {
   wake_();
 }
 
-void Viewer::enter(const Hello& hello, Clock::time_point now) {
+void Viewer::take(const Hello& hello, Clock::time_point now) {
   if (hello.version != protocolVersion) {
     refuse(Close::OtherVersion, fmt::format("this server uses protocol version {}, the viewer version {}",
                                             protocolVersion, hello.version));
@@ -210,7 +210,22 @@ void Viewer::enter(const Hello& hello, Clock::time_point now) {
   hub_.wakeAll();
 }
 
-void Viewer::show(std::uint32_t index) {
+void Viewer::take(const Ack& ack, Clock::time_point now) {
+  outbox_.acknowledge(ack, now);
+}
+
+void Viewer::take(const Pause& /*unused*/, Clock::time_point /*unused*/) {
+  outbox_.pause(true);
+}
+
+void Viewer::take(const Resume& /*unused*/, Clock::time_point now) {
+  outbox_.pause(false);
+  shown_.reset();
+  if (hub_.newest_) outbox_.offer(hub_.newest_, now);
+}
+
+void Viewer::take(const Show& wish, Clock::time_point /*unused*/) {
+  const std::uint32_t index = wish.index;
   if (!hub_.series_ || index >= hub_.series_->size() || !hub_.options_.show) {
     refuse(Close::BadMessage, fmt::format("the series has no frame {}", index));
     return;
@@ -223,7 +238,7 @@ void Viewer::deny(std::string cause) {
   denied_ = {std::move(cause)};
 }
 
-void Viewer::drive() {
+void Viewer::take(const Drive& /*unused*/, Clock::time_point /*unused*/) {
   if (!hub_.canSteer()) {
     deny("steering isn't allowed here");
   } else if (hub_.driver_ && hub_.driver_ != number_) {
@@ -235,13 +250,14 @@ void Viewer::drive() {
   }
 }
 
-void Viewer::release() {
+void Viewer::take(const Release& /*unused*/, Clock::time_point /*unused*/) {
   if (hub_.driver_ != number_) return;
   hub_.endDrive();
   hub_.wakeAll();
 }
 
-void Viewer::steer(const Wish& wish) {
+void Viewer::take(const Steer& steer, Clock::time_point /*unused*/) {
+  const Wish& wish = steer.wish;
   if (!hub_.canSteer() || hub_.driver_ != number_) {
     deny(hub_.canSteer() ? "this viewer doesn't drive" : "steering isn't allowed here");
     return;
@@ -260,29 +276,11 @@ void Viewer::receive(std::string_view text, Clock::time_point now) {
   if (farewell_) return;
   try {
     const FromViewer message = viewerMessage(text);
-    const auto* const hello = std::get_if<Hello>(&message);
-    if ((hello != nullptr) == isWelcome_) {
+    if (std::holds_alternative<Hello>(message) == isWelcome_) {
       refuse(Close::BadMessage, isWelcome_ ? "a second \"hello\"" : "the first message isn't \"hello\"");
-    } else if (hello != nullptr) {
-      enter(*hello, now);
-    } else if (const auto* const ack = std::get_if<Ack>(&message)) {
-      outbox_.acknowledge(*ack, now);
-    } else if (const auto* const wish = std::get_if<Show>(&message)) {
-      show(wish->index);
-    } else if (std::holds_alternative<Drive>(message)) {
-      drive();
-    } else if (std::holds_alternative<Release>(message)) {
-      release();
-    } else if (const auto* const steered = std::get_if<Steer>(&message)) {
-      steer(steered->wish);
-    } else {
-      const bool pauses = std::holds_alternative<Pause>(message);
-      outbox_.pause(pauses);
-      if (!pauses) {
-        shown_.reset();
-        if (hub_.newest_) outbox_.offer(hub_.newest_, now);
-      }
+      return;
     }
+    std::visit([&](const auto& m) { take(m, now); }, message);
   } catch (const Error& error) {
     refuse(Close::BadMessage, error.what());
   }

@@ -28,7 +28,7 @@ class Hub {
     std::string token;
     double mostBytesPerSecond = 0.0;  // to each viewer; 0: no limit
     std::uint32_t mostViewers = 0;
-    /// The most bytes of frames kept only because viewers still need them, without the newest frame.
+    /// Upper bound on the bytes of superseded frames held for slow viewers.
     std::uint64_t mostHeldBytes = std::uint64_t{1} << 30;
     /// Called when a viewer wants that frame of the series. Answer with provide or miss.
     std::function<void(std::uint32_t index)> show;
@@ -65,7 +65,7 @@ class Hub {
   /// a full level that isn't encoded yet by the finest coarse one.
   bool carriesWholeFrames() const;
   State state() const { return {phase_, viewerCount(), cause_}; }
-  /// The bytes of frames kept only because viewers still need them, without the newest frame.
+  /// The bytes of superseded frames held for slow viewers.
   std::uint64_t heldBytes() const;
 
  private:
@@ -130,11 +130,14 @@ class Viewer {
 
  private:
   Outgoing ahead(Clock::time_point now);
-  void enter(const Hello& hello, Clock::time_point now);
-  void show(std::uint32_t index);
-  void drive();
-  void release();
-  void steer(const Wish& wish);
+  void take(const Hello& hello, Clock::time_point now);
+  void take(const Ack& ack, Clock::time_point now);
+  void take(const Show& wish, Clock::time_point now);
+  void take(const Pause& pause, Clock::time_point now);
+  void take(const Resume& resume, Clock::time_point now);
+  void take(const Drive& drive, Clock::time_point now);
+  void take(const Release& release, Clock::time_point now);
+  void take(const Steer& steer, Clock::time_point now);
   void deny(std::string cause);
   std::optional<std::string> news();
   std::string announcement(const Outbox::LevelPart& part, Clock::time_point now) const;
