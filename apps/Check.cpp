@@ -15,7 +15,6 @@
 #include "apps/Say.h"
 #include "vdi/config/ColorMap.h"
 #include "vdi/config/Run.h"
-#include "vdi/core/ScalarRange.h"
 #include "vdi/core/TransferFunction.h"
 #include "vdi/io/Files.h"
 
@@ -55,8 +54,12 @@ std::string triggersOf(const config::Run& run) {
 void checkFiles(const config::Run& run) {
   const std::int64_t step = std::max<std::int64_t>(run.every, 1);
   const auto check = [&](const config::FilePattern& pattern) {
-    for (const config::RunCamera& camera : run.cameras) requireWritable(pattern.path(step, camera.name));
-    fmt::print("step {}: {}\n", step, printable(pattern.path(step, run.cameras.front().name).string()));
+    for (const config::RunField& field : run.fields) {
+      for (const config::RunCamera& camera : run.cameras)
+        requireWritable(pattern.path(step, camera.name, field.name));
+      const std::filesystem::path first = pattern.path(step, run.cameras.front().name, field.name);
+      fmt::print("step {}: {}\n", step, printable(first.string()));
+    }
     if (run.cameras.size() > 1) fmt::print("... and those of {} other viewpoints\n", run.cameras.size() - 1);
   };
   if (run.vdi) check(*run.vdi);
@@ -69,13 +72,18 @@ void checkFiles(const config::Run& run) {
 
 void check(const std::string& file) {
   const config::RunText source = config::readRun(file);
-  const config::Run run = config::parseRun(source.text, source.name);
-  std::optional<config::ColorMap> map;
-  if (const std::optional<std::string> colors = config::readColorsFile(run, source))
-    map = config::colorMapOf(*colors, run.colors.file, run.colors.name);
-  const ScalarRange any{0.0, 1.0};
-  validate(run.transferFunction(map, any, 1.0));
-  fmt::print("{}: {}, {} x {}, {}\n", printable(source.name), printable(run.field), run.settings.width,
+  config::Run run = config::parseRun(source.text, source.name);
+  std::string shown;
+  bool isAutomatic = false;  // the range of a field's colours
+  for (config::RunField& field : run.fields) {
+    config::RunColors& colors = field.colors;
+    if (!colors.file.empty())
+      colors.map = config::colorMapOf(config::readColorsFile(colors, source), colors.file, colors.name);
+    validate(colors.transferFunction({0.0, 1.0}, 1.0));
+    isAutomatic = isAutomatic || !colors.range;
+    shown += (shown.empty() ? "" : ", ") + (field.name.empty() ? field.array : field.name);
+  }
+  fmt::print("{}: {}, {} x {}, {}\n", printable(source.name), printable(shown), run.settings.width,
              run.settings.height, printable(triggersOf(run)));
   checkFiles(run);
   for (const std::string& log : {run.log.json, run.log.text}) {
@@ -84,10 +92,11 @@ void check(const std::string& file) {
     fmt::print("log: {}\n", printable(log));
   }
   if (run.stream) {
-    fmt::print("stream at {}:{}{}\n", printable(run.stream->host), run.stream->port,
+    fmt::print("stream at {}:{}{}{}\n", printable(run.stream->host), run.stream->port,
+               run.fields.size() > 1 ? " of the first field" : "",
                run.stream->steer ? ", which viewers may steer" : "");
   }
-  if (!run.colors.range)
+  if (isAutomatic)
     fmt::print("the colours have no range: the first frame's values set it, also after a restart\n");
   // The run may start in another folder.
   if (const auto there = run.firstExisting(); there && run.existing == config::Existing::Refuse) {

@@ -413,11 +413,19 @@ void IsolatedRun::tellLeftOut() {
   if (!untold_.steps.empty() && process_->tellLeftOut(untold_)) untold_.steps.clear();
 }
 
-/// Whether this rank has the fields that a JSON run names.
+/// The names of the arrays that a JSON run uses.
+std::vector<std::string> IsolatedRun::namedArrays() const {
+  std::vector<std::string> names;
+  for (const config::RunField& field : options_.run->fields) names.push_back(field.array);
+  if (options_.run->when) names.push_back(options_.run->when->field);
+  return names;
+}
+
+/// Whether this rank has the arrays that a JSON run uses.
 bool IsolatedRun::hasNamedFields() const {
   const Fields& fields = self_.fields;
   const auto has = [&](const std::string& name) { return fields.has(name, false) || fields.has(name, true); };
-  return options_.run && has(options_.run->field) && (!options_.run->when || has(options_.run->when->field));
+  return options_.run && std::ranges::all_of(namedArrays(), has);
 }
 
 /// The fields to hand over: all, or only those that a JSON run names.
@@ -428,8 +436,7 @@ StepFields IsolatedRun::fieldsOf(bool namedAlone) const {
     all.particles.push_back(
         {name, particles, self_.fields.offsetOf(name, true), self_.fields.missingOf(name, true)});
   if (!namedAlone) return all;
-  std::vector<std::string> names{options_.run->field};
-  if (options_.run->when) names.push_back(options_.run->when->field);
+  const std::vector<std::string> names = namedArrays();
   const auto isUnnamed = [&](const std::string& name) {
     return std::ranges::find(names, name) == names.end();
   };

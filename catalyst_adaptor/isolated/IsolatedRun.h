@@ -76,6 +76,7 @@ class IsolatedRun {
   bool isOfAny(bool answer) const;
   int leaveOut(std::int64_t step, double time);
   void tellLeftOut();
+  std::vector<std::string> namedArrays() const;
   bool hasNamedFields() const;
   StepFields fieldsOf(bool namedAlone) const;
   Setup setupOf(bool isGoingOn) const;

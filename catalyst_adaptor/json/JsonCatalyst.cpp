@@ -48,23 +48,31 @@ class Reading {
     code = guarded(self_, VDI_CATALYST_SCRIPT, [&] {
       run = vdi::config::parseRun(source_.text, source_.name);
       if (isGoingOn) run.existing = vdi::config::Existing::Continue;
-      if (comm_.rank() == 0) colors_ = vdi::config::readColorsFile(run, source_).value_or("");
     });
     if (code != VDI_CATALYST_OK) return code;
-    code = guarded(self_, VDI_CATALYST_SCRIPT, [&] {
+    for (vdi::config::RunField& field : run.fields) {
+      if (code == VDI_CATALYST_OK && !field.colors.file.empty()) code = readMap(field.colors);
+    }
+    if (code != VDI_CATALYST_OK) return code;
+    return guarded(self_, VDI_CATALYST_SCRIPT, [&] {
       if (comm_.rank() == 0) vdi::config::requireNothingInTheWay(run);
     });
-    if (code != VDI_CATALYST_OK || run.colors.file.empty()) return code;
-    code = guardedTogether(self_, VDI_CATALYST_ENGINE, [&] { share(colors_); });
-    if (code != VDI_CATALYST_OK) return code;
-    return guarded(self_, VDI_CATALYST_SCRIPT,
-                   [&] { map = vdi::config::colorMapOf(colors_, run.colors.file, run.colors.name); });
   }
 
   vdi::config::Run run;
-  std::optional<vdi::config::ColorMap> map;
 
  private:
+  int readMap(vdi::config::RunColors& colors) {
+    std::string text;
+    int code = guarded(self_, VDI_CATALYST_SCRIPT, [&] {
+      if (comm_.rank() == 0) text = vdi::config::readColorsFile(colors, source_);
+    });
+    if (code != VDI_CATALYST_OK) return code;
+    code = guardedTogether(self_, VDI_CATALYST_ENGINE, [&] { share(text); });
+    if (code != VDI_CATALYST_OK) return code;
+    return guarded(self_, VDI_CATALYST_SCRIPT,
+                   [&] { colors.map = vdi::config::colorMapOf(text, colors.file, colors.name); });
+  }
   /// Gives all ranks rank 0's text.
   void share(std::string& text) {
     text = comm_.broadcastText([&] { return std::move(text); }, 0);
@@ -73,7 +81,6 @@ class Reading {
   vdi_catalyst& self_;
   const vdi::comm::Communicator& comm_;
   vdi::config::RunText source_;
-  std::string colors_;
 };
 
 /// The process that makes a run's frames: the simulation's, a separate one, or the successor of a separate
@@ -90,8 +97,8 @@ int start(vdi_catalyst& self, const char* json, FrameMaker maker) {
   if (code == VDI_CATALYST_OK) code = reading->read(json, maker == FrameMaker::NextProcess);
   if (code != VDI_CATALYST_OK) return code;
   code = guarded(self, VDI_CATALYST_ENGINE, [&] {
-    self.engine = std::make_unique<vdi::catalyst::RunEngine>(
-        MPI_Comm_c2f(self.comm), std::move(*comm), std::move(reading->run), std::move(reading->map));
+    self.engine = std::make_unique<vdi::catalyst::RunEngine>(MPI_Comm_c2f(self.comm), std::move(*comm),
+                                                             std::move(reading->run));
   });
   if (code != VDI_CATALYST_OK) return code;
   return guardedTogether(self, VDI_CATALYST_ENGINE,

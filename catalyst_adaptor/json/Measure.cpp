@@ -147,7 +147,7 @@ std::optional<double> Measure::of(const comm::Communicator& comm, const Fields& 
   Totals totals;
   comm.together([&] {
     const std::vector<Block> blocks =
-        fields.blocksOf(condition_.field, cells, condition_.component, missing_);
+        fields.blocksOf(condition_.field, cells, condition_.component, condition_.missing);
     for (const OwnedPart& part : parts_) totals.take(Sweep(part, blocks[part.block]).run());
   });
   using Kind = config::RunCondition::Measure;

@@ -20,9 +20,7 @@ namespace vdi::catalyst {
 /// half in each. Values of staggered grids count like those of their cells or points.
 class Measure {
  public:
-  /// `missing` are numbers that stand for missing values, beside the array's own.
-  explicit Measure(config::RunCondition condition, std::vector<double> missing = {})
-      : condition_(std::move(condition)), missing_(std::move(missing)) {}
+  explicit Measure(config::RunCondition condition) : condition_(std::move(condition)) {}
   const config::RunCondition& condition() const { return condition_; }
 
   /// Collective: the maximum or minimum, or the mean for Mean and Change; nullopt if no value counts. Throws
@@ -41,7 +39,6 @@ class Measure {
   void findParts(const comm::Communicator& comm, const Fields& fields, bool cells);
 
   config::RunCondition condition_;
-  std::vector<double> missing_;
   std::vector<OwnedPart> parts_;
   /// The blocks whose parts these are: their version, kind of values, and each one's address and place of its
   /// first value.

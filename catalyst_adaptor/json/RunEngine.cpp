@@ -73,12 +73,17 @@ runlog::LogFiles logFilesOf(const config::RunLogFiles& names) {
   return files;
 }
 
-runlog::FrameRecord recordOf(std::int64_t step, double time, const config::RunCamera& camera) {
-  runlog::FrameRecord record;
-  record.step = step;
-  record.time = time;
-  record.camera = camera.name;
-  return record;
+/// The text of a failure; empty if it is another rank's.
+std::string textOf(const std::exception_ptr& failure) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const Error& error) {
+    return error.code() == ErrorCode::RemoteRank ? "" : error.what();
+  } catch (const std::bad_alloc&) {
+    return "out of memory on this host";
+  } catch (const std::exception& error) {
+    return error.what();
+  }
 }
 
 /// The resident memory, shared memory included.
@@ -107,8 +112,23 @@ std::vector<const config::FilePattern*> patternsOf(const config::Run& run) {
 
 }  // namespace
 
-/// The data that the cameras of a step share.
+/// A field from a camera.
+struct RunEngine::Shown {
+  const config::RunField& field;
+  const config::RunCamera& camera;
+  runlog::FrameRecord recordOf(std::int64_t step, double time) const {
+    runlog::FrameRecord record;
+    record.step = step;
+    record.time = time;
+    record.field = field.name;
+    record.camera = camera.name;
+    return record;
+  }
+};
+
+/// The data of a step's field that its cameras share.
 struct RunEngine::LoadedFrame {
+  const config::RunField* field = nullptr;
   std::int64_t step = 0;
   double time = 0.0;
   double unitDistance = 1.0;
@@ -123,9 +143,19 @@ struct RunEngine::State {
         mostDeviceBytes(static_cast<std::uint64_t>(run.maxDeviceMiB.value_or(0)) << 20),
         schedule(run),
         wallTimeShare(run.maxShare),
-        hostMemory(run.maxHostMiB) {
-    if (run.when) measure.emplace(*run.when, run.missing);
+        hostMemory(run.maxHostMiB),
+        fields(run.fields.size()) {
+    if (run.when) measure.emplace(*run.when);
   }
+
+  /// What a field keeps from frame to frame.
+  struct FieldState {
+    std::optional<ScalarRange> firstRange;    // the colours' range, unless the field has one
+    std::optional<double> firstUnitDistance;  // the opacities', unless the field has one
+    TransferFunction lastFunction;            // of the last frame, and what it has lost
+    std::string lastLoss;
+    std::exception_ptr failure;  // of the step
+  };
 
   /// Collective: makes the device and the objects that need one. After a failure, no rank has them.
   void start() {
@@ -143,6 +173,9 @@ struct RunEngine::State {
     deposits = std::move(fresh);
   }
   bool isRoot() const { return comm.rank() == 0; }
+  FieldState& of(const config::Run& run, const config::RunField& field) {
+    return fields[static_cast<std::size_t>(&field - run.fields.data())];
+  }
   /// Collective: the root's answer on all ranks.
   bool asRootSays(bool answer) const { return comm.broadcast(answer ? 1.0 : 0.0, 0) != 0.0; }
   double elapsed() const { return std::chrono::duration<double>(Clock::now() - begin).count(); }
@@ -164,22 +197,16 @@ struct RunEngine::State {
   std::unique_ptr<stream::LiveStream> stream;  // the root's
   std::unique_ptr<io::CinemaIndex> cinema;     // the root's
   std::optional<RunSteering> steering;
-  std::optional<ScalarRange> firstRange;  // the colours' range, unless the run has one
-  TransferFunction lastFunction;          // of the last frame, and what it has lost
-  std::string lastLoss;
-  std::optional<double> firstUnitDistance;  // the opacities', unless the run has one
-  std::optional<LoadedFrame> frame;         // the frame whose values the device has
-  bool isAskedFor = false;                  // a viewer waits for a view, which the next step shows
+  std::vector<FieldState> fields;    // as the run's
+  std::optional<LoadedFrame> frame;  // the frame whose values the device has
+  bool isAskedFor = false;           // a viewer waits for a view, which the next step shows
   bool hasToldOfShare = false;
   bool hasToldOfMemory = false;
   std::optional<double> clock;  // the schedule's time in seconds, given for the next step
 };
 
-RunEngine::RunEngine(int fortranCommunicator, comm::Communicator comm, config::Run run,
-                     std::optional<config::ColorMap> map)
-    : run_(std::move(run)),
-      map_(std::move(map)),
-      state_(std::make_unique<State>(fortranCommunicator, std::move(comm), run_)) {}
+RunEngine::RunEngine(int fortranCommunicator, comm::Communicator comm, config::Run run)
+    : run_(std::move(run)), state_(std::make_unique<State>(fortranCommunicator, std::move(comm), run_)) {}
 
 RunEngine::~RunEngine() = default;
 
@@ -194,11 +221,20 @@ void RunEngine::open(bool isIsolated) {
   const bool isAnew = run_.existing == config::Existing::Overwrite;
   state.comm.together([&] {
     if (!state.isRoot()) return;
-    if (run_.cinema) state.cinema = std::make_unique<io::CinemaIndex>(run_.cinema->folder, !isAnew);
+    const config::RunField& first = run_.fields.front();
+    if (run_.cinema) {
+      state.cinema = std::make_unique<io::CinemaIndex>(run_.cinema->folder, !isAnew, !first.name.empty());
+    }
     if (run_.stream) state.stream = std::make_unique<stream::LiveStream>(liveOptionsOf(*run_.stream));
+    if (run_.stream && run_.fields.size() > 1) {
+      fmt::print(stderr, "vdi_catalyst: the stream shows the first field, '{}'; all {} have files\n",
+                 first.name, run_.fields.size());
+    }
     // The log comes last, because a start that fails leaves no line in it, and doesn't empty it.
     if (run_.log.any()) {
-      const runlog::RunStart start{run_.field, state.comm.size(), std::time(nullptr), isIsolated};
+      runlog::RunStart start{{}, state.comm.size(), std::time(nullptr), isIsolated};
+      for (const config::RunField& field : run_.fields)
+        start.fields.push_back(field.name.empty() ? field.array : field.name);
       using Before = runlog::RunLog::Before;
       state.log = std::make_unique<runlog::RunLog>(logFilesOf(run_.log), start,
                                                    isAnew ? Before::Goes : Before::Stays);
@@ -341,7 +377,7 @@ void RunEngine::execute(Fields& fields, Parameters& parameters, std::int64_t ste
   if (state.steering) state.steering->requireLogged();
 }
 
-/// Makes the frames of all cameras, or only those of the first camera if they are for the stream.
+/// Makes the frames of all fields and cameras, or only that of the first ones if it is for the stream.
 void RunEngine::makeAll(Fields& fields, std::int64_t step, double time, double waited, bool isForFiles) {
   State& state = *state_;
   const auto begin = Clock::now();
@@ -349,40 +385,64 @@ void RunEngine::makeAll(Fields& fields, std::int64_t step, double time, double w
   if (state.hostMemory.isSet()) state.comm.together([&] { before = memoryOfThisProcess(); });
   std::vector<double> waits;
   if (run_.log.any()) waits = millisecondsOfRanks(waited);
-  std::exception_ptr first;
-  for (const config::RunCamera& camera : run_.cameras) {
-    const auto start = Clock::now();
-    runlog::FrameRecord frame;
-    std::exception_ptr failure;
-    try {
-      makeOne(fields, step, time, camera, isForFiles, frame);
-    } catch (const std::exception&) {  // thrown on all ranks, but not the same exception on each
-      failure = std::current_exception();
+  bool hasFailed = false;
+  for (std::size_t i = 0; i < run_.fields.size(); ++i) {
+    std::exception_ptr& first = state.fields[i].failure;
+    first = nullptr;
+    for (const config::RunCamera& camera : run_.cameras) {
+      const auto start = Clock::now();
+      const Shown shown{run_.fields[i], camera};
+      runlog::FrameRecord frame;
+      std::exception_ptr failure;
+      try {
+        makeOne(fields, step, time, shown, isForFiles, frame);
+      } catch (const std::exception&) {  // thrown on all ranks, but not the same exception on each
+        failure = std::current_exception();
+      }
+      try {
+        const auto failed = [&](const char* error) {
+          frame = shown.recordOf(step, time);
+          frame.error = error;
+        };
+        record(frame, failure, failed, waits, start);
+      } catch (...) {
+        failure = std::current_exception();
+      }
+      waits.clear();
+      if (!first) first = failure;
+      if (!state.frame || !isForFiles) break;  // other cameras would fail, too
     }
-    try {
-      const auto failed = [&](const char* error) {
-        frame = recordOf(step, time, camera);
-        frame.error = error;
-      };
-      record(frame, failure, failed, waits, start);
-    } catch (...) {
-      failure = std::current_exception();
-    }
-    waits.clear();
-    if (!first) first = failure;
-    if (!state.frame || !isForFiles) break;  // other cameras would fail, too
+    hasFailed = hasFailed || first;
+    if (!isForFiles) break;
   }
   state.wallTimeShare.spend(std::chrono::duration<double>(Clock::now() - begin).count());
   if (state.hostMemory.isSet())
     state.comm.together([&] { state.hostMemory.spend(before, memoryOfThisProcess()); });
-  if (isForFiles && !first) state.meanOfLast = state.meanNow;
+  if (isForFiles && !hasFailed) state.meanOfLast = state.meanNow;
   try {
     state.comm.together([&] {
       if (state.cinema && isForFiles) state.cinema->write();
     });
   } catch (...) {
-    if (!first) first = std::current_exception();
+    if (!hasFailed) throw;
   }
+  throwFailures();
+}
+
+/// Throws the step's failures, of which several fields have one each. If a field has failed, it has on all
+/// ranks.
+void RunEngine::throwFailures() {
+  std::exception_ptr first;
+  std::string text;
+  for (std::size_t i = 0; i < run_.fields.size(); ++i) {
+    const std::exception_ptr failure = std::exchange(state_->fields[i].failure, nullptr);
+    if (!failure) continue;
+    if (!first) first = failure;
+    const std::string own = textOf(failure);
+    if (!own.empty())
+      text += fmt::format("{}field '{}': {}", text.empty() ? "" : "; ", run_.fields[i].name, own);
+  }
+  if (!text.empty() && run_.fields.size() > 1) throw std::runtime_error(text);
   if (first) std::rethrow_exception(first);
 }
 
@@ -420,13 +480,14 @@ void RunEngine::record(runlog::FrameRecord& frame, const std::exception_ptr& fai
 /// Takes the viewers' requests. While they pause the simulation, makes a VDI for each view that they ask for.
 void RunEngine::steer(Fields& fields, Parameters& parameters, std::int64_t step, double time) {
   State& state = *state_;
-  const Steered steered{run_, map_, state.schedule, state.firstRange, parameters};
+  const Steered steered{run_, state.schedule, state.fields.front().firstRange, parameters};
+  const Shown shown{run_.fields.front(), run_.cameras.front()};
   while (state.steering->take(steered, step, time)) {
     state.isAskedFor = true;
     if (!state.steering->isPaused()) return;
     try {
-      runlog::FrameRecord none = recordOf(step, time, run_.cameras.front());
-      makeOne(fields, step, time, run_.cameras.front(), false, none);
+      runlog::FrameRecord none = shown.recordOf(step, time);
+      makeOne(fields, step, time, shown, false, none);
       state.isAskedFor = false;
     } catch (const std::exception& error) {  // the viewer may ask for something else
       if (state.isRoot()) fmt::print(stderr, "vdi_catalyst: step {}: {}\n", step, error.what());
@@ -472,13 +533,13 @@ void RunEngine::tryTwice(Work work) {
   work();
 }
 
-void RunEngine::makeOne(Fields& fields, std::int64_t step, double time, const config::RunCamera& camera,
-                        bool isForFiles, runlog::FrameRecord& record) {
+void RunEngine::makeOne(Fields& fields, std::int64_t step, double time, const Shown& shown, bool isForFiles,
+                        runlog::FrameRecord& record) {
   try {
     tryTwice([&] {
-      state_->comm.together([&] { record = recordOf(step, time, camera); });
-      if (!state_->frame) prepare(fields, step, time);
-      deliver(camera, isForFiles, record);
+      state_->comm.together([&] { record = shown.recordOf(step, time); });
+      if (!state_->frame || state_->frame->field != &shown.field) prepare(fields, step, time, shown.field);
+      deliver(shown, isForFiles, record);
     });
   } catch (const Error& error) {  // thrown on all ranks
     if (error.code() != ErrorCode::OutOfMemory || !run_.maxDeviceMiB) throw;
@@ -486,64 +547,75 @@ void RunEngine::makeOne(Fields& fields, std::int64_t step, double time, const co
   }
 }
 
-/// Gives the device the step's values.
-void RunEngine::prepare(Fields& fields, std::int64_t step, double time) {
+/// Whether the stream shows it.
+bool RunEngine::isFirst(const Shown& shown) const {
+  return &shown.field == run_.fields.data() && &shown.camera == run_.cameras.data();
+}
+
+/// Gives the device the step's values of a field.
+void RunEngine::prepare(Fields& fields, std::int64_t step, double time, const config::RunField& field) {
   State& state = *state_;
   const comm::Communicator& comm = state.comm;
-  const bool cells = agreeOnCells(comm, fields, run_.field, run_.cells);
-  if (cells) deposit(fields, run_.field, step);
+  State::FieldState& own = state.of(run_, field);
+  state.frame.reset();
+  const bool cells = agreeOnCells(comm, fields, field.array, field.cells);
+  if (cells) deposit(fields, field.array, step);
   std::vector<Block> blocks;
   std::array<double, 2> largest{};  // the most values per unit of volume, and the most components
   comm.together([&] {
-    blocks = fields.blocksOf(run_.field, cells, run_.component, run_.missing);
+    blocks = fields.blocksOf(field.array, cells, field.component, field.missing);
     for (Block& block : blocks) {
       largest[0] = std::max(largest[0], 1.0 / (block.spacing.x * block.spacing.y * block.spacing.z));
-      block.nearest = run_.settings.interpolation == Interpolation::Nearest;
+      block.nearest = field.interpolation == Interpolation::Nearest;
     }
-    largest[1] = static_cast<double>(fields.componentsOf(run_.field, cells));
+    largest[1] = static_cast<double>(fields.componentsOf(field.array, cells));
   });
   comm.allReduceMax(largest);
 
   VdiGenerator& generator = *state.generator;
   generator.setBlocks(std::move(blocks));
   const ScalarRange range = generator.scalarRange();
-  if (!state.firstRange && range.min < range.max) {
-    state.firstRange = range;
-    comm.together([&] { noteRange(range); });
+  if (!own.firstRange && range.min < range.max) {
+    own.firstRange = range;
+    comm.together([&] { noteRange(field, range); });
   }
   const double voxelVolume = largest[0] > 0.0 ? 1.0 / largest[0] : 0.0;
   const int components = static_cast<int>(largest[1]);
   LoadedFrame frame;
+  frame.field = &field;
   frame.step = step;
   frame.time = time;
-  frame.range = state.firstRange.value_or(range);
+  frame.range = own.firstRange.value_or(range);
   // The unit distance stays the first frame's, or opacities would jump where levels of refinement come and
   // go.
   const double unitDistance = unitDistanceOf(generator.scene().bounds, voxelVolume);
-  if (!state.firstUnitDistance && voxelVolume > 0.0) state.firstUnitDistance = unitDistance;
-  frame.unitDistance = state.firstUnitDistance.value_or(unitDistance);
+  if (!own.firstUnitDistance && voxelVolume > 0.0) own.firstUnitDistance = unitDistance;
+  frame.unitDistance = own.firstUnitDistance.value_or(unitDistance);
   comm.together([&] {
     frame.stamp = {time,
                    static_cast<std::uint64_t>(step),
-                   {.name = run_.field,
+                   {.name = field.array,
                     .cells = cells,
                     .components = components,
-                    .component = components > 1 ? run_.component : 0}};
+                    .component = components > 1 ? field.component : 0}};
   });
   state.frame = std::move(frame);
 }
 
 /// Says that the first frame's range, by which all frames are coloured, is much wider than its values.
-void RunEngine::noteRange(const ScalarRange& range) const {
-  if (run_.colors.range || !state_->isRoot()) return;
+void RunEngine::noteRange(const config::RunField& field, const ScalarRange& range) const {
+  if (field.colors.range || !state_->isRoot()) return;
   if (const std::optional<ScalarRange> part = state_->generator->crowdedPart()) {
     std::fprintf(stderr, "vdi_catalyst: field '%s': %s (\"range\" of \"colors\", \"missing\")\n",
-                 run_.field.c_str(), describeCrowded(range, *part).c_str());
+                 field.array.c_str(), describeCrowded(range, *part).c_str());
   }
 }
 
-void RunEngine::deliver(const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record) {
+void RunEngine::deliver(const Shown& shown, bool isForFiles, runlog::FrameRecord& record) {
   State& state = *state_;
+  const config::RunField& field = shown.field;
+  const config::RunCamera& camera = shown.camera;
+  State::FieldState& own = state.of(run_, field);
   VdiGenerator& generator = *state.generator;
   const LoadedFrame& frame = *state.frame;
   const bool isRoot = state.isRoot();
@@ -551,58 +623,58 @@ void RunEngine::deliver(const config::RunCamera& camera, bool isForFiles, runlog
   TransferFunction function;
   std::filesystem::path file;  // the VDI's path; empty without a VDI
   state.comm.together([&] {
-    if (isForFiles && run_.vdi) file = run_.vdi->path(frame.step, camera.name);
+    if (isForFiles && run_.vdi) file = run_.vdi->path(frame.step, camera.name, field.name);
     from = run_.cameraAt(camera, frame.step, frame.time, generator.scene().bounds);
-    function = run_.transferFunction(map_, frame.range, frame.unitDistance);
+    function = field.colors.transferFunction(frame.range, frame.unitDistance);
     if (!isRoot) return;
-    if (function != state.lastFunction) {
-      state.lastFunction = function;
+    if (function != own.lastFunction) {
+      own.lastFunction = function;
       const std::string loss = describeLoss(function);
-      if (!loss.empty() && loss != state.lastLoss)
-        std::fprintf(stderr, "vdi_catalyst: field '%s': %s\n", run_.field.c_str(), loss.c_str());
-      state.lastLoss = loss;
+      if (!loss.empty() && loss != own.lastLoss)
+        std::fprintf(stderr, "vdi_catalyst: field '%s': %s\n", field.array.c_str(), loss.c_str());
+      own.lastLoss = loss;
     }
     if (!isForFiles) return;
     for (const config::FilePattern* pattern : patternsOf(run_))
-      makeFolderOf(pattern->path(frame.step, camera.name));
+      makeFolderOf(pattern->path(frame.step, camera.name, field.name));
   });
-  const bool isStreamed = run_.stream && &camera == run_.cameras.data();
-  if (isForFiles && !run_.makesPictures() && !isStreamed) {
+  const GenerateSettings settings = run_.settingsOf(field);
+  if (isForFiles && !run_.makesPictures() && !(run_.stream && isFirst(shown))) {
     if (!run_.vdi) return;
     // The ranks write the file together, so that no rank ever has the whole VDI.
-    generator.write(file, from, function, run_.settings, frame.stamp);
+    generator.write(file, from, function, settings, frame.stamp);
     state.comm.together([&] {
       if (!isRoot) return;
       runlog::setReports(record, generator.reports());
       record.files.push_back(file.string());
-      noteLatest(camera);
+      noteLatest(shown);
     });
     return;
   }
-  std::optional<Vdi> made = generator.generate(from, function, run_.settings);
+  std::optional<Vdi> made = generator.generate(from, function, settings);
   state.comm.together([&] {
     if (!made) return;
     made->time = frame.stamp.time;
     made->timeStep = frame.stamp.step;
     made->coloring->array = frame.stamp.array;
-    save(std::move(*made), camera, isForFiles, record);
+    save(std::move(*made), shown, isForFiles, record);
   });
 }
 
 /// Saves and streams the VDI on the root, which has it. The time that it takes counts as output.
-void RunEngine::save(Vdi vdi, const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record) {
+void RunEngine::save(Vdi vdi, const Shown& shown, bool isForFiles, runlog::FrameRecord& record) {
   const auto start = Clock::now();
   std::vector<RankReport> reports = state_->generator->reports();
   if (isForFiles) {
     if (run_.vdi) {
-      const std::filesystem::path file = run_.vdi->path(record.step, camera.name);
+      const std::filesystem::path file = run_.vdi->path(record.step, shown.camera.name, shown.field.name);
       io::writeVdi(file, vdi);
       record.files.push_back(file.string());
     }
-    if (run_.makesPictures()) writePictures(vdi, camera, record);
-    noteLatest(camera);
+    if (run_.makesPictures()) writePictures(vdi, shown, record);
+    noteLatest(shown);
   }
-  if (state_->stream && &camera == run_.cameras.data()) {
+  if (state_->stream && isFirst(shown)) {
     state_->stream->publish(std::make_shared<const Vdi>(std::move(vdi)));
     state_->stream->requireSent();
   }
@@ -612,33 +684,40 @@ void RunEngine::save(Vdi vdi, const config::RunCamera& camera, bool isForFiles, 
 }
 
 /// Writes the pictures. Called on the root.
-void RunEngine::writePictures(const Vdi& vdi, const config::RunCamera& camera, runlog::FrameRecord& record) {
+void RunEngine::writePictures(const Vdi& vdi, const Shown& shown, runlog::FrameRecord& record) {
+  const config::RunField& field = shown.field;
+  const config::RunCamera& camera = shown.camera;
   const auto picture = io::toPicture(flatten(vdi));
   if (run_.png) {
-    const std::filesystem::path file = run_.png->path(record.step, camera.name);
+    const std::filesystem::path file = run_.png->path(record.step, camera.name, field.name);
     io::writePng(file, picture);
     record.files.push_back(file.string());
   }
   if (!run_.cinema || camera.fixed) return;  // a viewer's viewpoint isn't on the orbit
-  const std::filesystem::path file = run_.cinema->pictures.path(record.step, camera.name);
+  const std::filesystem::path file = run_.cinema->pictures.path(record.step, camera.name, field.name);
   io::writePng(file, picture);
   record.files.push_back(file.string());
   const config::Orbit place = run_.orbitAt(*camera.orbit, record.step, record.time);
   state_->cinema->add({record.time, place.azimuth, place.elevation,
-                       file.lexically_relative(run_.cinema->folder).generic_string()});
+                       file.lexically_relative(run_.cinema->folder).generic_string(), field.name});
 }
 
 /// Links the names of the latest files to the step's files. Called on the root.
-void RunEngine::noteLatest(const config::RunCamera& camera) const {
+void RunEngine::noteLatest(const Shown& shown) const {
   if (!run_.latest) return;
-  const std::string name = camera.name.empty() ? "latest" : "latest_" + camera.name;
-  const auto link = [&](const std::optional<config::FilePattern>& pattern, const char* extension) {
+  const config::RunField& field = shown.field;
+  const config::RunCamera& camera = shown.camera;
+  std::string link = "latest";
+  for (const std::string& name : {field.name, camera.name}) {
+    if (!name.empty()) link += "_" + name;
+  }
+  const auto replace = [&](const std::optional<config::FilePattern>& pattern, const char* extension) {
     if (!pattern) return;
-    const std::filesystem::path file = pattern->path(state_->frame->step, camera.name);
-    io::replaceLink(file.parent_path() / (name + extension), file.filename());
+    const std::filesystem::path file = pattern->path(state_->frame->step, camera.name, field.name);
+    io::replaceLink(file.parent_path() / (link + extension), file.filename());
   };
-  link(run_.vdi, ".vdi");
-  link(run_.png, ".png");
+  replace(run_.vdi, ".vdi");
+  replace(run_.png, ".png");
 }
 
 }  // namespace vdi::catalyst

@@ -11,7 +11,6 @@
 
 #include "catalyst_adaptor/Fields.h"
 #include "catalyst_adaptor/Parameters.h"
-#include "vdi/config/ColorMap.h"
 #include "vdi/config/Run.h"
 #include "vdi/core/FunctionRef.h"
 #include "vdi/core/Vdi.h"
@@ -23,10 +22,8 @@ namespace vdi::catalyst {
 /// with Error{RemoteRank} or std::runtime_error if another rank reports more. The next frame is tried again.
 class RunEngine {
  public:
-  /// Not collective. `comm` is a duplicate of `fortranCommunicator`. `map` comes from the colours' file, if
-  /// the run names one.
-  RunEngine(int fortranCommunicator, comm::Communicator comm, config::Run run,
-            std::optional<config::ColorMap> map);
+  /// Not collective. `comm` is a duplicate of `fortranCommunicator`. The colours' files are read.
+  RunEngine(int fortranCommunicator, comm::Communicator comm, config::Run run);
   /// Hands the last frame over to the stream.
   ~RunEngine();
   RunEngine(const RunEngine&) = delete;
@@ -55,6 +52,7 @@ class RunEngine {
  private:
   struct State;
   struct LoadedFrame;
+  struct Shown;
   using Clock = std::chrono::steady_clock;
   void open(bool isIsolated);
   bool isDue(std::int64_t step, double time);
@@ -64,24 +62,25 @@ class RunEngine {
   bool hasHostMemory(std::int64_t step, double time);
   void leaveOut(std::int64_t step, double time, bool& hasTold, FunctionRef<std::string()> causeText);
   void makeAll(Fields& fields, std::int64_t step, double time, double waited, bool isForFiles);
-  void makeOne(Fields& fields, std::int64_t step, double time, const config::RunCamera& camera,
-               bool isForFiles, runlog::FrameRecord& record);
+  void makeOne(Fields& fields, std::int64_t step, double time, const Shown& shown, bool isForFiles,
+               runlog::FrameRecord& record);
+  void throwFailures();
   void record(runlog::FrameRecord& record, const std::exception_ptr& failure,
               FunctionRef<void(const char* error)> failed, const std::vector<double>& waits,
               Clock::time_point start);
   void steer(Fields& fields, Parameters& parameters, std::int64_t step, double time);
   template <typename Work>
   void tryTwice(Work work);
-  void prepare(Fields& fields, std::int64_t step, double time);
-  void noteRange(const ScalarRange& range) const;
-  void deliver(const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record);
-  void save(Vdi vdi, const config::RunCamera& camera, bool isForFiles, runlog::FrameRecord& record);
-  void writePictures(const Vdi& vdi, const config::RunCamera& camera, runlog::FrameRecord& record);
-  void noteLatest(const config::RunCamera& camera) const;
+  bool isFirst(const Shown& shown) const;
+  void prepare(Fields& fields, std::int64_t step, double time, const config::RunField& field);
+  void noteRange(const config::RunField& field, const ScalarRange& range) const;
+  void deliver(const Shown& shown, bool isForFiles, runlog::FrameRecord& record);
+  void save(Vdi vdi, const Shown& shown, bool isForFiles, runlog::FrameRecord& record);
+  void writePictures(const Vdi& vdi, const Shown& shown, runlog::FrameRecord& record);
+  void noteLatest(const Shown& shown) const;
   std::vector<double> millisecondsOfRanks(double seconds) const;
 
   config::Run run_;
-  std::optional<config::ColorMap> map_;
   std::unique_ptr<State> state_;
 };
 

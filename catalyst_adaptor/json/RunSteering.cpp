@@ -32,16 +32,17 @@ void rescale(std::vector<OpacityNode>& nodes, const std::array<double, 2>& range
 
 stream::Controls RunSteering::controlsOf(const Steered& steered) const {
   const config::Run& run = steered.run;
+  const config::RunColors& colors = run.fields.front().colors;
   stream::GeneratorControls generator;
   generator.resolution = {run.settings.width, run.settings.height};
   generator.supersegments = static_cast<int>(run.settings.supersegments);
   generator.samplingRate = run.settings.samplesPerVoxel;
-  const std::optional<ScalarRange> range = run.colors.range ? run.colors.range : steered.range;
+  const std::optional<ScalarRange> range = colors.range ? colors.range : steered.range;
   if (range) {
     generator.range = {range->min, range->max};
     generator.presets = config::presetNames();
-    const bool isDefault = run.colors.file.empty() && run.colors.preset.empty();
-    generator.preset = isDefault ? generator.presets.front() : run.colors.preset;
+    const bool isDefault = colors.file.empty() && colors.preset.empty();
+    generator.preset = isDefault ? generator.presets.front() : colors.preset;
   }
   stream::Controls controls;
   controls.generator = std::move(generator);
@@ -54,6 +55,7 @@ stream::Controls RunSteering::controlsOf(const Steered& steered) const {
 
 void RunSteering::apply(const stream::Wish& wish, const Steered& steered) {
   config::Run& run = steered.run;
+  config::RunColors& colors = run.fields.front().colors;
   if (wish.camera) run.cameras.front().fixed = wish.camera;
   if (wish.resolution) {
     run.settings.width = (*wish.resolution)[0];
@@ -62,14 +64,14 @@ void RunSteering::apply(const stream::Wish& wish, const Steered& steered) {
   if (wish.supersegments) run.settings.supersegments = static_cast<std::uint32_t>(*wish.supersegments);
   if (wish.samplingRate) run.settings.samplesPerVoxel = *wish.samplingRate;
   if (wish.preset) {  // keeps the range, and opacities that the run names
-    if (!run.colors.range) run.colors.range = steered.range;
-    run.colors.preset = *wish.preset;
-    run.colors.file.clear();
-    steered.map.reset();
+    if (!colors.range) colors.range = steered.range;
+    colors.preset = *wish.preset;
+    colors.file.clear();
+    colors.map.reset();
   }
   if (wish.range) {
-    run.colors.range = ScalarRange{(*wish.range)[0], (*wish.range)[1]};
-    rescale(run.colors.opacities, *wish.range);
+    colors.range = ScalarRange{(*wish.range)[0], (*wish.range)[1]};
+    rescale(colors.opacities, *wish.range);
   }
   steered.parameters.set(wish.parameters);
   if (wish.period) steered.schedule.setPeriod(*wish.period);

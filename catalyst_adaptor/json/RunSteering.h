@@ -7,7 +7,6 @@
 
 #include "catalyst_adaptor/Parameters.h"
 #include "vdi/comm/Communicator.h"
-#include "vdi/config/ColorMap.h"
 #include "vdi/config/Run.h"
 #include "vdi/config/Schedule.h"
 #include "vdi/core/ScalarRange.h"
@@ -16,10 +15,10 @@
 
 namespace vdi::catalyst {
 
-/// The parts of the engine that viewers change, equal on all ranks.
+/// The parts of the engine that viewers change, equal on all ranks. Colours are those of the run's first
+/// field, which the stream shows.
 struct Steered {
   config::Run& run;
-  std::optional<config::ColorMap>& map;
   config::Schedule& schedule;
   const std::optional<ScalarRange>& range;  // range of the colours if the run has none
   Parameters& parameters;

@@ -19,7 +19,8 @@ PRELOADED = "".join(library + ":" for library in os.environ.get("LD_PRELOAD", ""
 
 def run(document, *codes, said="", **environment):
     """Returns the simulation's output. Each step must return its code."""
-    process = subprocess.run([*simulation, json.dumps({**SMALL, **document}), *(str(code) for code in codes)],
+    text = json.dumps({name: value for name, value in {**SMALL, **document}.items() if value is not None})
+    process = subprocess.run([*simulation, text, *(str(code) for code in codes)],
                              env={**os.environ, "VDI_OUTPUT": os.getcwd(), **environment}, capture_output=True, text=True,
                              timeout=PATIENCE)
     print(process.stderr)
@@ -140,6 +141,39 @@ def cameras():
     assert os.readlink("top/latest_top.vdi") == "v_2.vdi" and os.readlink("latest_top.png") == "p_2_top.png"
     pictures = {open("p_0_%s.png" % name, "rb").read() for name in ("front", "top", "near")}
     assert len(pictures) == 3, "each viewpoint has a picture of its own"
+
+
+def fields():
+    """A run of three fields makes the files of three runs, byte for byte, also from processes of its own."""
+    shared = {"every": 2, "missing": [1], "cameras": [{"name": "front", "orbit": {}},
+                                                      {"name": "top", "orbit": {"elevation": 60}}],
+              "output": {"vdi": "{field}_{timestep}.vdi", "cinema": "c.cdb", "latest": True}}
+    shown = {"V": {"field": "V"},
+             "w1": {"field": "w", "component": 1, "interpolation": "nearest", "colors": {"preset": "haze", "range": [0, 2]}},
+             "p": {"field": "p", "missing": [999999], "colors": "bands"}}
+    for name, one in shown.items():
+        run({**shared, **one, "output": name + "_{timestep}.vdi"}, 0, 0, 0)
+    alone = {name: open(name, "rb").read() for name in made()}
+    assert len(alone) == 12, list(alone)
+    three = {**shared, "field": None, "fields": ["V", {**shown["w1"], "name": "w1"}, shown["p"]], "log": "run.jsonl"}
+    for how in ({}, {"VDI_ISOLATION": "process"}):
+        run({**three, "existing": "overwrite"}, 0, 0, 0, **how)
+        assert {name: open(name, "rb").read() for name in alone} == alone, how
+    assert os.readlink("latest_w1_top.vdi") == "w1_2_top.vdi"
+    rows = list(csv.DictReader(open("c.cdb/data.csv")))
+    assert list(rows[0]) == ["time", "phi", "theta", "field", "FILE"] and len(rows) == 12, rows
+    assert [row["field"] for row in rows[:6]] == ["V", "V", "w1", "w1", "p", "p"], rows
+    assert rows[3]["FILE"] == "000000/w1/top.png" and os.path.getsize("c.cdb/000000/w1/top.png") > 0, rows
+    assert events()[0]["fields"] == ["V", "w1", "p"], events()[0]
+    assert [(event["field"], event["camera"]) for event in events()[1:7]] == [
+        (name, camera) for name in ("V", "w1", "p") for camera in ("front", "top")], events()
+    refused(three, "V_0_front.vdi")
+    # A field that fails costs the others no frame, and the message names each that failed. The stream shows one field.
+    text = run({**three, "fields": ["none", "V", "nowhere"], "output": "f_{timestep}.vdi", "existing": "overwrite",
+                "stream": True}, 3, said="the stream shows the first field, 'none'; all 3 have files")
+    assert "step 0: rank 0: field 'none': no array is named 'none'; the arrays are" in text, text
+    assert "; field 'nowhere': no array is named 'nowhere'" in text and made(start="f_") == ["f_0_V_front.vdi", "f_0_V_top.vdi"]
+    assert [event["field"] for event in events()[1:] if "error" in event] == ["none", "nowhere"], events()
 
 
 def cinema():

@@ -33,7 +33,9 @@ const std::vector<std::string> runs{
   {"name": "b", "camera": {"position": [0, 0, 1], "focal_point": [0, 0, 0]}}],
  "stream": {"steer": true, "steering_log": "a"}, "output": "{timestep}.vdi"})",
     R"({"field": "V", "orbit": {"count": 3, "elevations": [-10, 20]}, "output": {"cinema": "a.cdb",
- "vdi": "{camera}/{timestep}.vdi"}})"};
+ "vdi": "{camera}/{timestep}.vdi"}})",
+    R"({"fields": ["V", {"field": "u", "name": "b", "component": 1, "missing": [0, -1], "interpolation": "nearest",
+ "colors": {"preset": "haze", "range": [0, 2]}}], "association": "cells", "output": "{field}/{timestep}.vdi"})"};
 const std::vector<std::string> presets{
     R"([{"Name": "a", "ColorSpace": "Diverging", "RGBPoints": [0, 0.1, 0.2, 0.3, 1, 0.9, 0.8, 0.2, 3, 1, 1, 1]}])",
     R"({"ColorSpace": "Lab", "RGBPoints": [-1, 0, 0, 0, 1, 1, 1, 1], "Points": [0, 0, 0.5, 0, 2, 0.5, 0.5, 0]})",
@@ -97,11 +99,13 @@ void readAndMake(const std::string& text) {
   INFO(text);
   const Box bounds{glm::dvec3(-1.0), glm::dvec3(2.0)};
   REQUIRE_NOTHROW(validate(run.settings));
-  REQUIRE_NOTHROW(validate(run.transferFunction(std::nullopt, {0.0, 1.0}, 1.0)));
+  REQUIRE_FALSE(run.fields.empty());
+  for (const config::RunField& field : run.fields)
+    REQUIRE_NOTHROW(validate(field.colors.transferFunction({0.0, 1.0}, 1.0)));
   REQUIRE_FALSE(run.cameras.empty());
   for (const config::RunCamera& camera : run.cameras)
     REQUIRE_NOTHROW(View(run.cameraAt(camera, run.every, 2.0, bounds), 4, 4));
-  if (run.vdi) REQUIRE(run.vdi->path(7, run.cameras.back().name).has_filename());
+  if (run.vdi) REQUIRE(run.vdi->path(7, run.cameras.back().name, run.fields.back().name).has_filename());
   if (run.when) REQUIRE((run.when->above || run.when->below));
 }
 

@@ -60,13 +60,15 @@ const json* objectIn(const json& part) {
 
 TEST_CASE("V every 10 steps is one line") {
   const Run run = parseRun(R"({"field": "V", "every": 10})", "vdi.json");
-  CHECK(run.field == "V");
+  REQUIRE(run.fields.size() == 1);
+  CHECK(run.fields[0].array == "V");
+  CHECK(run.fields[0].name.empty());
   const Schedule schedule(run);
   CHECK_FALSE(schedule.needsRoot());
   CHECK(schedule.isDue(0, 0.0, 0.0));
   CHECK_FALSE(schedule.isDue(5, 0.0, 0.0));
   CHECK(schedule.isDue(30, 0.0, 0.0));
-  CHECK(run.component == -1);
+  CHECK(run.fields[0].component == -1);
   CHECK(run.settings.width == 1280);
   CHECK(run.settings.samplesPerVoxel == automaticRate);
   REQUIRE(run.vdi);
@@ -96,8 +98,8 @@ TEST_CASE("every field of the schema is read, and no other") {
   for (const auto& [name, part] : all.at("properties").items()) {
     const json& value = followed(all, part);
     if (const json* object = objectIn(value)) compare("/" + name, *object);
-    if (value.contains("items") && value.at("items").contains("properties"))
-      compare("/" + name + "/*", value.at("items"));
+    const json* item = value.contains("items") ? objectIn(value.at("items")) : nullptr;
+    if (item != nullptr) compare("/" + name + "/*", *item);
   }
   CHECK(seen.size() == config::runFields().size());
 }
@@ -119,14 +121,14 @@ TEST_CASE("the schema's presets are those that there are, and its defaults those
   CHECK(stated.settings == implied.settings);
   CHECK(stated.every == implied.every);
   CHECK(stated.existing == implied.existing);
-  CHECK(stated.component == implied.component);
+  CHECK(stated.fields[0].component == implied.fields[0].component);
 }
 
 TEST_CASE("the schema has the ranges and names of the table of settings") {
   const json all = schema();
   for (const Setting& setting : settingsTable()) {
     INFO(setting.key);
-    const json& part = all.at("properties").at(setting.key);
+    const json& part = followed(all, all.at("properties").at(setting.key));
     const double standard =
         setting.key == std::string("sampling_rate") ? automaticRate : setting.get(GenerateSettings());
     switch (setting.kind) {
@@ -163,8 +165,8 @@ TEST_CASE("everything at once") {
                "origins": ["https://a.example"], "embed_in": ["https://b.example", "http://c.example"],
                "megabits": 100, "steer": true, "steering_log": "s"}})",
                            "vdi.json");
-  CHECK(run.cells == std::optional<bool>(false));
-  CHECK(run.component == 2);
+  CHECK(run.fields[0].cells == std::optional<bool>(false));
+  CHECK(run.fields[0].component == 2);
   CHECK(run.settings.width == 320);
   CHECK(run.settings.height == 200);
   CHECK(run.settings.supersegments == 12);
@@ -199,7 +201,7 @@ TEST_CASE("everything at once") {
   CHECK(run.isolation->patience == 20.0);
   CHECK_FALSE(parseRun(R"({"field": "V"})", "vdi.json").isolation);
   CHECK(parseRun(R"({"field": "V", "isolation": "process"})", "vdi.json").isolation->patience == 300.0);
-  const TransferFunction function = run.transferFunction(std::nullopt, {5.0, 6.0}, 7.0);
+  const TransferFunction function = run.fields[0].colors.transferFunction({5.0, 6.0}, 7.0);
   CHECK(function.colors.back().x == 2.0);
   CHECK(function.opacities == std::vector<OpacityNode>{{0.0, 0.0}, {2.0, 0.5}});
   CHECK(function.unitDistance == 3.0);
@@ -210,15 +212,15 @@ TEST_CASE("everything at once") {
 }
 
 TEST_CASE("the default colours are ParaView's, over the first frame's range") {
-  const Run run = parseRun(R"({"field": "V"})", "vdi.json");
-  const TransferFunction function = run.transferFunction(std::nullopt, {2.0, 4.0}, 0.25);
+  const config::RunColors colors = parseRun(R"({"field": "V"})", "vdi.json").fields[0].colors;
+  const TransferFunction function = colors.transferFunction({2.0, 4.0}, 0.25);
   CHECK(function.opacities == std::vector<OpacityNode>{{2.0, 0.0}, {4.0, 1.0}});
   CHECK(function.colors.front() == ColorNode{2.0, {0.231373, 0.298039, 0.752941}});
   CHECK(function.colors.back().x == 4.0);
   CHECK(function.unitDistance == 0.25);
   CHECK_NOTHROW(validate(function));
-  CHECK_NOTHROW(validate(run.transferFunction(std::nullopt, {3.0, 3.0}, 1.0)));
-  CHECK_NOTHROW(validate(run.transferFunction(std::nullopt, ScalarRange(), 1.0)));
+  CHECK_NOTHROW(validate(colors.transferFunction({3.0, 3.0}, 1.0)));
+  CHECK_NOTHROW(validate(colors.transferFunction(ScalarRange(), 1.0)));
 }
 
 TEST_CASE("mistakes are told with their place") {
@@ -353,6 +355,65 @@ TEST_CASE("each camera has files of its own") {
   CHECK(named.cameraAt(named.cameras[1], 0, 0.0, unit).position.z > 1.0);
   const Run turning = parseRun(R"({"field": "V", "every_time": 0.5, "orbit": {"turn": 10}})", "vdi.json");
   CHECK(turning.orbitAt(*turning.cameras[0].orbit, 77, 1.5).azimuth == Approx(30.0));
+}
+
+TEST_CASE("each field has entries and files of its own") {
+  const Run run = parseRun(R"({"association": "points", "component": 1, "missing": [-9999], "shade": true,
+      "interpolation": "nearest", "colors": {"preset": "haze", "range": [0, 1]}, "when": {"max": "u", "above": 0},
+      "fields": ["V", {"field": "u", "name": "speed", "association": "cells", "component": "magnitude", "missing": [],
+                       "colors": "bands", "interpolation": "linear"}, {"field": "u", "component": 0}],
+      "orbit": {"count": 2}, "output": {"vdi": "{field}/{timestep:03d}.vdi", "png": "a_{timestep}.png",
+                                        "cinema": "c.cdb"}})",
+                           "vdi.json");
+  REQUIRE(run.fields.size() == 3);
+  CHECK(run.fields[0].array == "V");
+  CHECK(run.fields[0].name == "V");
+  CHECK(run.fields[0].cells == std::optional<bool>(false));
+  CHECK(run.fields[0].component == 1);
+  CHECK(run.fields[0].missing == std::vector<double>{-9999.0});
+  CHECK(run.fields[0].colors.preset == "haze");
+  CHECK(run.fields[1].array == "u");
+  CHECK(run.fields[1].name == "speed");
+  CHECK(run.fields[1].cells == std::optional<bool>(true));
+  CHECK(run.fields[1].component == -1);
+  CHECK(run.fields[1].missing.empty());
+  CHECK(run.when->missing.empty());  // as u is shown
+  CHECK(run.fields[1].colors.preset == "bands");
+  CHECK_FALSE(run.fields[1].colors.range);
+  CHECK(run.fields[2].name == "u");
+  CHECK(run.fields[2].component == 0);
+  CHECK(run.fields[2].colors.range->max == 1.0);
+  CHECK(run.settingsOf(run.fields[0]).interpolation == Interpolation::Nearest);
+  CHECK(run.settingsOf(run.fields[1]).interpolation == Interpolation::Linear);
+  CHECK(run.settingsOf(run.fields[1]).shading.on);
+  CHECK(run.vdi->path(7, "1", "speed") == "speed/007_1.vdi");
+  CHECK(run.png->path(7, "1", "speed") == "a_7_speed_1.png");
+  CHECK(run.cinema->pictures.path(7, "1", "speed") == "c.cdb/000007/speed/1.png");
+  CHECK(parseRun(R"({"fields": ["V"], "missing": [3], "when": {"max": "p", "above": 0}})", "vdi.json")
+            .when->missing == std::vector<double>{3.0});
+  CHECK(parseRun(R"({"fields": ["V"]})", "vdi.json").vdi->path(7, "", "V") == "vdi_000007_V.vdi");
+
+  refused(R"({"fields": []})", "/fields: must have a field");
+  refused(R"({"fields": ["V", "p", "V"]})",
+          "/fields/2: another field has the name 'V'; a 'name' tells them apart");
+  refused(R"({"fields": ["V", {"field": "p", "name": "V"}]})", "/fields/1: another field has the name 'V'");
+  refused(R"({"fields": ["V/m"]})", "/fields/0: files can't have this array's name; add a 'name' of 1 to 64");
+  refused(R"({"fields": [{"field": "V/m", "name": "../a"}]})", "/fields/0/name: a field's name has 1 to 64");
+  refused(R"({"fields": [{"name": "a"}]})", "/fields/0: the field 'field' is missing");
+  refused(R"({"fields": [{"field": "V", "shade": true}]})",
+          "/fields/0/shade: no such field; the fields are field");
+  refused(R"({"fields": [{"field": "V", "interpolation": "cubic"}]})",
+          "/fields/0/interpolation: no interpolation");
+  refused(R"({"fields": [3]})", "/fields/0: must be an object");
+  refusedField(R"("fields": ["p"])", "/field: can't be combined with 'fields'");
+  refusedField(R"("output": "{timestep}_{field}.vdi")", "/output: {field} needs 'fields'");
+  refused(R"({"fields": ["V", "p"], "stream": true})", "several fields need an 'output'");
+  const std::string alike = R"({"fields": ["a", "a_b"], "cameras": [{"name": "c", "orbit": {}},
+                               {"name": "b_c", "orbit": {}}], "output": )";
+  refused(alike + R"("{timestep}.vdi"})",
+          "/output: field 'a_b' from camera 'c' has the same file as another");
+  refused(alike + R"({"vdi": "{field}/{timestep}.vdi", "latest": true}})", "/output/latest: field 'a_b'");
+  CHECK_NOTHROW(parseRun(alike + R"("{field}/{timestep}.vdi"})", "vdi.json"));
 }
 
 TEST_CASE("times of the simulation are met after a restart as before it") {

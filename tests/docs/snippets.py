@@ -152,6 +152,7 @@ def check_run(text):
 for document, start in (("README.md", '{"field": "V", "every": 10}'),
                         ("docs/catalyst-guide.md", '{"field": "V", "every": 10}'),
                         ("docs/catalyst-guide.md", '{\n  "field": "V",\n  "every": 10'),
+                        ("docs/catalyst-guide.md", '{\n  "every": 10,\n  "colors": "haze"'),
                         ("docs/catalyst-guide.md", '{"field": "V", "every_time"'),
                         ("docs/catalyst-guide.md", '{"field": "V", "every": 10, "isolation"'),
                         ("docs/live.md", '{"field": "V", "stream"')):

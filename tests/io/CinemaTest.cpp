@@ -52,6 +52,17 @@ TEST_CASE("a Cinema index continues an existing one, or begins again") {
   CHECK(database.text() == "time,phi,theta,FILE\n");
 }
 
+TEST_CASE("a Cinema index of several fields names them") {
+  const Database database;
+  io::CinemaIndex index(database.folder, false, true);
+  index.add({0.5, 30.0, -45.0, "a.png", "V"});
+  index.write();
+  CHECK(database.text() == "time,phi,theta,field,FILE\n0.5,30,-45,V,a.png\n");
+  CHECK_NOTHROW(io::CinemaIndex(database.folder, true, true));
+  CHECK_THROWS_WITH(io::CinemaIndex(database.folder, true),
+                    test::ContainsSubstring("columns time,phi,theta,FILE"));
+}
+
 TEST_CASE("an index of other columns isn't gone on with") {
   const Database database;
   for (const char* text : {"time,FILE\n0,a.png\n", "time,phi,theta,FILE\n0,0,a.png\n", "0,0,0,a.png\n"}) {

@@ -45,13 +45,13 @@ TEST_CASE("each stage of each frame is as high as it took long") {
   CHECK_THAT(mean, test::ContainsSubstring("380.00h386.75V290.00"));
   CHECK(countOf(mean, ">10</text>") == 1);  // the step
   CHECK(countOf(mean, "the simulation's wait") == 1);
-  records.starts.push_back({"V", 2, 0, true});
+  records.starts.push_back({{"V"}, 2, 0, true});
   CHECK(countOf(plot(records, {"run", true}), "the simulation's wait") == 0);
 }
 
 TEST_CASE("names and errors can't leave their elements") {
   RunRecords records;
-  records.starts.push_back({"a<b>&c", 2, 0});
+  records.starts.push_back({{"a<b>&c"}, 2, 0});
   records.frames.push_back(frameOf(1, 1.0, {}));
   records.frames.back().error = "</title><script>";
   const std::string svg = plot(records, {"<run>", false});

@@ -55,6 +55,7 @@ TEST_CASE("reports come to the slowest rank's and the mean rank's milliseconds")
 
 TEST_CASE("a line of JSON keeps a record") {
   FrameRecord failed = frame();
+  failed.field = "p";
   failed.camera = "top";
   failed.stages.clear();
   failed.error = "no\nspace";
@@ -63,9 +64,10 @@ TEST_CASE("a line of JSON keeps a record") {
   summary.add(failed);
   summary.seconds = 1.0;
   summary.isIsolated = GENERATE(false, true);
-  runlog::RunStart start{"V", 4, 1700000000, summary.isIsolated};
+  runlog::RunStart start{GENERATE(std::vector<std::string>{"V"}, std::vector<std::string>{"V", "p"}), 4,
+                         1700000000, summary.isIsolated};
   if (GENERATE(false, true)) {
-    start.field.clear();
+    start.fields.clear();
     start.scripts = {"a/first.py", "second.py"};
   }
   const std::string lines =

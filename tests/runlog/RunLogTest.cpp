@@ -43,7 +43,7 @@ TEST_CASE("a log has the run's start, its frames and its end, and a second run a
   const fs::path json = folder.path() / "new" / "run.jsonl";
   const fs::path text = folder.path() / "run.log";
   for (int run = 0; run < 2; ++run) {
-    RunLog log({json, text}, {"V", 2, 0});
+    RunLog log({json, text}, {{"V"}, 2, 0});
     log.add(frameOf(10, 3.0));
     log.add(frameOf(20, 5.0, "no"));
     const runlog::RunSummary summary = log.finish();
@@ -65,7 +65,7 @@ TEST_CASE("a line that has no room leaves nothing of itself, and the next one is
   const test::TemporaryFolder folder;
   const fs::path json = folder.path() / "run.jsonl";
   const fs::path text = folder.path() / "run.log";
-  RunLog log({json, text}, {"V", 1, 0});
+  RunLog log({json, text}, {{"V"}, 1, 0});
   log.add(frameOf(1, 1.0));
   const std::string before = contentOf(json);
   {
@@ -85,7 +85,7 @@ TEST_CASE("a line that was left unfinished spoils no other") {
   const test::TemporaryFolder folder;
   const fs::path json = folder.path() / "run.jsonl";
   std::ofstream(json) << "{\"event\": \"fra";
-  RunLog log({json, {}}, {"V", 1, 0});
+  RunLog log({json, {}}, {{"V"}, 1, 0});
   log.add(frameOf(1, 1.0));
   const RunRecords records = readRecords(json);
   CHECK(records.skipped == 1);
@@ -95,8 +95,8 @@ TEST_CASE("a line that was left unfinished spoils no other") {
 
 TEST_CASE("a log that can't be is refused at once") {
   const test::TemporaryFolder folder;
-  CHECK_THROWS_AS(RunLog({folder.path(), {}}, {"V", 1, 0}), Error);
-  CHECK_THROWS_WITH(RunLog({"/dev/null", {}}, {"V", 1, 0}), test::ContainsSubstring("regular file"));
+  CHECK_THROWS_AS(RunLog({folder.path(), {}}, {{"V"}, 1, 0}), Error);
+  CHECK_THROWS_WITH(RunLog({"/dev/null", {}}, {{"V"}, 1, 0}), test::ContainsSubstring("regular file"));
   const fs::path file = folder.path() / "other";
   std::ofstream(file) << "some text\n";
   CHECK_THROWS_WITH(readRecords(file), test::ContainsSubstring("not a run's log"));
@@ -107,8 +107,8 @@ TEST_CASE("neither file of a log loses its content if the other one can't be ope
   const test::TemporaryFolder folder;
   const fs::path file = folder.path() / "run";
   std::ofstream(file) << "an earlier run\n";
-  CHECK_THROWS_AS(RunLog({file, folder.path()}, {"V", 1, 0}, RunLog::Before::Goes), Error);
-  CHECK_THROWS_AS(RunLog({folder.path(), file}, {"V", 1, 0}, RunLog::Before::Goes), Error);
+  CHECK_THROWS_AS(RunLog({file, folder.path()}, {{"V"}, 1, 0}, RunLog::Before::Goes), Error);
+  CHECK_THROWS_AS(RunLog({folder.path(), file}, {{"V"}, 1, 0}, RunLog::Before::Goes), Error);
   CHECK(contentOf(file) == "an earlier run\n");
 }
 
@@ -120,15 +120,15 @@ TEST_CASE("a start that has no room leaves no file that it has made, and those t
   std::ofstream(old) << line;
   {
     const test::FileSizeLimit full(line.size());
-    CHECK_THROWS_AS(RunLog({fresh, {}}, {"V", 1, 0}), Error);
-    CHECK_THROWS_AS(RunLog({{}, fresh}, {"V", 1, 0}), Error);
-    CHECK_THROWS_AS(RunLog({fresh, old}, {"V", 1, 0}), Error);
-    CHECK_THROWS_AS(RunLog({old, fresh}, {"V", 1, 0}), Error);
+    CHECK_THROWS_AS(RunLog({fresh, {}}, {{"V"}, 1, 0}), Error);
+    CHECK_THROWS_AS(RunLog({{}, fresh}, {{"V"}, 1, 0}), Error);
+    CHECK_THROWS_AS(RunLog({fresh, old}, {{"V"}, 1, 0}), Error);
+    CHECK_THROWS_AS(RunLog({old, fresh}, {{"V"}, 1, 0}), Error);
   }
-  CHECK_THROWS_AS(RunLog({fresh, folder.path()}, {"V", 1, 0}), Error);
+  CHECK_THROWS_AS(RunLog({fresh, folder.path()}, {{"V"}, 1, 0}), Error);
   CHECK_FALSE(fs::exists(fresh));
   CHECK(contentOf(old) == line);
-  RunLog({fresh, {}}, {"V", 1, 0});
+  RunLog({fresh, {}}, {{"V"}, 1, 0});
   CHECK(readRecords(fresh).starts.size() == 1);
 }
 
@@ -137,7 +137,7 @@ TEST_CASE("a log starts over where it is told to, and has what was left out") {
   const fs::path json = folder.path() / "run.jsonl";
   const fs::path text = folder.path() / "run.log";
   for (int run = 0; run < 2; ++run) {
-    RunLog log({json, text}, {"V", 2, 0}, RunLog::Before::Goes);
+    RunLog log({json, text}, {{"V"}, 2, 0}, RunLog::Before::Goes);
     log.add(frameOf(10, 3.0));
     log.add(runlog::LeftOut{20, 0.25, "no\ntime"});
     CHECK(log.finish().leftOut == 1);

@@ -45,26 +45,31 @@ FilePattern::FilePattern(const std::string& text) : text_(text) {
   const std::size_t colon = start + std::string(stepMark).size();
   if (end > colon) digits_ = digitsOf(text.substr(colon, end - colon));
   std::string rest = text.substr(0, start) + text.substr(end + 1);
-  const std::size_t camera = rest.find(cameraMark);
-  if (camera != std::string::npos) rest.erase(camera, std::string(cameraMark).size());
+  for (const std::string_view mark : {cameraMark, fieldMark}) {
+    const std::size_t at = rest.find(mark);
+    if (at != std::string::npos) rest.erase(at, mark.size());
+  }
   if (rest.find_first_of("{}") != std::string::npos)
-    throw std::invalid_argument("only {timestep} and {camera} may appear in braces, once each");
+    throw std::invalid_argument("only {timestep}, {camera} and {field} may appear in braces, once each");
   if (rest.find('\0') != std::string::npos || !path(0).has_filename())
     throw std::invalid_argument("isn't a file's name");
 }
 
 /// The text before the step's number, and the text after it.
-std::pair<std::string, std::string> FilePattern::around(const std::string& camera) const {
+std::pair<std::string, std::string> FilePattern::around(const std::string& camera,
+                                                        const std::string& field) const {
   std::string text = text_;
-  const std::size_t mark = text.find(cameraMark);
-  if (mark != std::string::npos) {
-    text.replace(mark, std::string(cameraMark).size(), camera);
-  } else if (!camera.empty()) {
-    const std::size_t name = text.find_last_of('/') == std::string::npos ? 0 : text.find_last_of('/') + 1;
-    const std::size_t dot = text.find_last_of('.');
-    const bool hasExtension =
-        dot != std::string::npos && dot > name && text.find('}', dot) == std::string::npos;
-    text.insert(hasExtension ? dot : text.size(), "_" + camera);
+  std::string added;
+  if (!field.empty() && !namesField()) added += "_" + field;
+  if (!camera.empty() && !namesCamera()) added += "_" + camera;
+  const std::size_t name = text.find_last_of('/') == std::string::npos ? 0 : text.find_last_of('/') + 1;
+  const std::size_t dot = text.find_last_of('.');
+  const bool hasExtension =
+      dot != std::string::npos && dot > name && text.find('}', dot) == std::string::npos;
+  text.insert(hasExtension ? dot : text.size(), added);
+  for (const auto& [mark, part] : {std::pair(fieldMark, field), std::pair(cameraMark, camera)}) {
+    const std::size_t at = text.find(mark);
+    if (at != std::string::npos) text.replace(at, mark.size(), part);
   }
   const std::size_t start = text.find(stepMark);
   return {text.substr(0, start), text.substr(text.find('}', start) + 1)};
@@ -74,14 +79,16 @@ std::string FilePattern::numberOf(std::int64_t step) const {
   return fmt::format("{:0{}}", step, digits_);
 }
 
-std::filesystem::path FilePattern::path(std::int64_t step, const std::string& camera) const {
-  const auto [front, back] = around(camera);
+std::filesystem::path FilePattern::path(std::int64_t step, const std::string& camera,
+                                        const std::string& field) const {
+  const auto [front, back] = around(camera, field);
   return front + numberOf(step) + back;
 }
 
-std::optional<std::filesystem::path> FilePattern::firstExisting(const std::string& camera) const {
+std::optional<std::filesystem::path> FilePattern::firstExisting(const std::string& camera,
+                                                                const std::string& field) const {
   // The step may be in a folder's name, so this searches for the part of the path with the number.
-  const auto [front, back] = around(camera);
+  const auto [front, back] = around(camera, field);
   const std::size_t slash = front.find_last_of('/');
   const std::string folder = slash == std::string::npos ? "." : front.substr(0, slash + 1);
   const std::string head = slash == std::string::npos ? front : front.substr(slash + 1);
@@ -97,10 +104,11 @@ std::optional<std::filesystem::path> FilePattern::firstExisting(const std::strin
     const std::optional<std::int64_t> step = stepOf(number);
     if (!step || number != numberOf(*step) || (lowest && *lowest <= *step)) continue;
     std::error_code ignored;
-    if (std::filesystem::exists(std::filesystem::symlink_status(path(*step, camera), ignored))) lowest = step;
+    if (std::filesystem::exists(std::filesystem::symlink_status(path(*step, camera, field), ignored)))
+      lowest = step;
   }
   if (!lowest) return std::nullopt;
-  return path(*lowest, camera);
+  return path(*lowest, camera, field);
 }
 
 }  // namespace vdi::config

@@ -37,22 +37,27 @@ Camera Run::cameraAt(const RunCamera& camera, std::int64_t step, double time, co
   return Camera::framing(bounds, {0.0, 0.0, -1.0}, along.viewUp, along.viewAngle);
 }
 
-TransferFunction Run::transferFunction(const std::optional<ColorMap>& map, const ScalarRange& range,
-                                       double unitDistance) const {
-  ScalarRange wide = colors.range.value_or(range);
+GenerateSettings Run::settingsOf(const RunField& field) const {
+  GenerateSettings own = settings;
+  own.interpolation = field.interpolation;
+  return own;
+}
+
+TransferFunction RunColors::transferFunction(const ScalarRange& first, double firstUnitDistance) const {
+  ScalarRange wide = range.value_or(first);
   if (!(wide.min <= wide.max)) wide = {0.0, 1.0};
   if (wide.min == wide.max) wide.max += 1.0;
   TransferFunction function;
-  if (!map && !colors.preset.empty() && colors.preset != defaultPreset) {
-    function = presetTransferFunction(colors.preset, wide, 1.0);
+  if (!map && !preset.empty() && preset != defaultPreset) {
+    function = presetTransferFunction(preset, wide, 1.0);
   } else {
     const ColorMap scaled = rescaled(map ? *map : coolToWarm(), wide);
     function.colors = scaled.colors;
     function.opacities = scaled.opacities;
     if (function.opacities.empty()) function.opacities = {{wide.min, 0.0}, {wide.max, 1.0}};
   }
-  if (!colors.opacities.empty()) function.opacities = colors.opacities;
-  function.unitDistance = colors.unitDistance.value_or(unitDistance);
+  if (!opacities.empty()) function.opacities = opacities;
+  function.unitDistance = unitDistance.value_or(firstUnitDistance);
   return function;
 }
 
@@ -62,9 +67,11 @@ std::optional<std::filesystem::path> Run::firstExisting() const {
   if (png) patterns.push_back(*png);
   if (cinema) patterns.push_back(cinema->pictures);
   for (const FilePattern& pattern : patterns) {
-    for (const RunCamera& one : cameras) {
-      std::optional<std::filesystem::path> file = pattern.firstExisting(one.name);
-      if (file) return file;
+    for (const RunField& field : fields) {
+      for (const RunCamera& one : cameras) {
+        std::optional<std::filesystem::path> file = pattern.firstExisting(one.name, field.name);
+        if (file) return file;
+      }
     }
   }
   std::error_code error;
@@ -106,9 +113,8 @@ RunText readRun(const std::string& fileOrText) {
   return {readJsonText(fileOrText), fileOrText, std::filesystem::path(fileOrText).parent_path()};
 }
 
-std::optional<std::string> readColorsFile(const Run& run, const RunText& source) {
-  if (run.colors.file.empty()) return std::nullopt;
-  return readJsonText((source.folder / run.colors.file).string(), presetLimits);
+std::string readColorsFile(const RunColors& colors, const RunText& source) {
+  return readJsonText((source.folder / colors.file).string(), presetLimits);
 }
 
 }  // namespace vdi::config

@@ -28,6 +28,21 @@ struct RunColors {
   // by values of the field; empty: the preset's, or a ramp from 0 to 1
   std::vector<OpacityNode> opacities;
   std::optional<double> unitDistance;  // world units; none: unitDistanceOf the first frame
+  std::optional<ColorMap> map;         // the preset in `file`, once somebody has read it
+
+  /// The transfer function. `first` is the range of the first frame's values.
+  TransferFunction transferFunction(const ScalarRange& first, double firstUnitDistance) const;
+};
+
+/// An array that a run shows, and how.
+struct RunField {
+  std::string array;
+  std::string name;             // as it appears in files' names; empty: the run's only field
+  std::optional<bool> cells;    // none: as the simulation hands the array over
+  int component = -1;           // of a vector field: a component, magnitude or phase (ComponentValues.h)
+  std::vector<double> missing;  // numbers that stand for missing values
+  RunColors colors;
+  Interpolation interpolation = Interpolation::Linear;
 };
 
 /// An orbit around the bounds of the field's blocks.
@@ -51,8 +66,9 @@ struct RunCondition {
   enum class Measure { Max, Min, Mean, Change };
   Measure measure = Measure::Max;
   std::string field;
-  std::optional<bool> cells;  // as in Run
+  std::optional<bool> cells;  // as in RunField
   int component = -1;
+  std::vector<double> missing = {};
   std::optional<double> above;  // at least one of the two is set; both: above < below
   std::optional<double> below;
   bool holds(double value) const { return (!above || value > *above) && (!below || value < *below); }
@@ -96,10 +112,7 @@ struct RunCinema {
 };
 
 struct Run {
-  std::string field;
-  std::optional<bool> cells;    // none: as the simulation hands the field over
-  int component = -1;           // of a vector field: a component, magnitude or phase (ComponentValues.h)
-  std::vector<double> missing;  // numbers that stand for missing values in all fields
+  std::vector<RunField> fields{{}};  // at least one; the first is the stream's
   /// A frame is made when any of these three is due (Schedule), if `when` holds at that step.
   std::int64_t every = 1;              // due at multiples of this step; 0: none
   std::optional<double> everyTime;     // period in the simulation's time
@@ -110,8 +123,7 @@ struct Run {
   std::optional<std::int64_t> maxHostMiB;    // host memory beyond which frames are left out
   Existing existing = Existing::Refuse;
   std::vector<RunCamera> cameras{{}};  // at least one; the first is the stream's
-  RunColors colors;
-  GenerateSettings settings;
+  GenerateSettings settings;           // of all fields, but for the interpolation
   std::optional<FilePattern> vdi;
   std::optional<FilePattern> png;
   std::optional<RunCinema> cinema;
@@ -121,14 +133,11 @@ struct Run {
   std::optional<RunIsolation> isolation;  // none: frames are made in the simulation's processes
 
   bool makesPictures() const { return png || cinema; }
+  GenerateSettings settingsOf(const RunField& field) const;
   /// The place of an orbiting camera, which turns with the frames.
   Orbit orbitAt(const RunOrbit& orbit, std::int64_t step, double time) const;
   /// The camera at a step. `bounds` are the scene's.
   Camera cameraAt(const RunCamera& camera, std::int64_t step, double time, const Box& bounds) const;
-  /// The transfer function. `map` comes from the colours' file, if they name one; `range` is that of the
-  /// first frame's values.
-  TransferFunction transferFunction(const std::optional<ColorMap>& map, const ScalarRange& range,
-                                    double unitDistance) const;
   /// The first existing file with one of this run's names: of frames, of the Cinema database, or a log that
   /// isn't empty.
   std::optional<std::filesystem::path> firstExisting() const;
@@ -159,7 +168,7 @@ struct RunText {
 /// Reads a run's text. `fileOrText` is the text itself if its first character that isn't blank is a brace,
 /// else a file's name. Throws Error as readJsonText.
 RunText readRun(const std::string& fileOrText);
-/// The text of the colours' file; nullopt if they name none. Throws Error as readJsonText.
-std::optional<std::string> readColorsFile(const Run& run, const RunText& source);
+/// The text of the file that the colours name. Throws Error as readJsonText.
+std::string readColorsFile(const RunColors& colors, const RunText& source);
 
 }  // namespace vdi::config

@@ -148,20 +148,25 @@ std::vector<RunCamera> camerasOfOrbit(const JsonValue& value) {
   return cameras;
 }
 
-std::string cameraNameOf(const JsonValue& value) {
+/// Whether a camera or field of this name can have files.
+bool namesFiles(const std::string& name) {
   constexpr std::string_view letters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
   constexpr std::size_t longest = 64;
+  return !name.empty() && name.size() <= longest && name[0] != '.' &&
+         name.find_first_not_of(letters) == std::string::npos;
+}
+constexpr const char* nameRule = "1 to 64 letters, digits, '_', '-' and '.'; it must not start with '.'";
+
+std::string fileNameOf(const JsonValue& value, const char* whose) {
   const std::string& name = value.text();
-  if (name.empty() || name.size() > longest || name[0] == '.' ||
-      name.find_first_not_of(letters) != std::string::npos)
-    value.fail("a camera's name has 1 to 64 letters, digits, '_', '-' and '.'; it must not start with '.'");
+  if (!namesFiles(name)) value.fail(fmt::format("a {}'s name has {}", whose, nameRule));
   return name;
 }
 
 RunCamera namedCameraOf(const JsonValue& value) {
   value.requireObject(fieldsOf("/cameras/*"));
   RunCamera camera;
-  camera.name = cameraNameOf(value.at("name"));
+  camera.name = fileNameOf(value.at("name"), "camera");
   ifThere(value, "camera", [&](const JsonValue& fixed) { camera.fixed = cameraOf(fixed); });
   ifThere(value, "orbit", [&](const JsonValue& orbit) {
     if (camera.fixed) orbit.fail("can't be combined with 'camera'");
@@ -340,11 +345,27 @@ RunColors colorsOf(const JsonValue& value) {
   return colors;
 }
 
+/// Refuses names of fields and cameras that make one file's name together, such as a_b and c, and a and b_c.
+void requireDistinct(const JsonValue& value, const FilePattern& pattern, const Run& run) {
+  if (run.fields.size() == 1 || run.cameras.size() == 1) return;
+  std::set<std::filesystem::path> paths;
+  for (const RunField& field : run.fields) {
+    for (const RunCamera& camera : run.cameras) {
+      const auto [path, isNew] = paths.insert(pattern.path(0, camera.name, field.name));
+      if (isNew) continue;
+      value.fail(fmt::format("field '{}' from camera '{}' has the same file as another field and camera, {}",
+                             field.name, camera.name, path->string()));
+    }
+  }
+}
+
 FilePattern patternOf(const JsonValue& value, const Run& run) {
   const std::string& text = value.text();
   FilePattern pattern = placed(value, [&] { return FilePattern(text); });
   if (pattern.namesCamera() && run.cameras.front().name.empty())
     value.fail("{camera} needs several viewpoints");
+  if (pattern.namesField() && run.fields.front().name.empty()) value.fail("{field} needs 'fields'");
+  requireDistinct(value, pattern, run);
   return pattern;
 }
 
@@ -355,9 +376,10 @@ RunCinema cinemaOf(const JsonValue& value, const Run& run) {
   const bool areOrbits =
       std::ranges::all_of(run.cameras, [](const RunCamera& one) { return one.orbit.has_value(); });
   if (!areOrbits) value.fail("a Cinema database needs an 'orbit'");
-  const std::string pictures =
-      run.cameras.front().name.empty() ? "{timestep:06d}.png" : "{timestep:06d}/{camera}.png";
-  return {folder, FilePattern((folder / pictures).string())};
+  std::string pictures = "{timestep:06d}";
+  if (!run.fields.front().name.empty()) pictures += "/{field}";
+  if (!run.cameras.front().name.empty()) pictures += "/{camera}";
+  return {folder, FilePattern((folder / (pictures + ".png")).string())};
 }
 
 void readOutput(const JsonValue& value, Run& run) {
@@ -381,7 +403,9 @@ void readOutput(const JsonValue& value, Run& run) {
   if (!run.vdi && !run.makesPictures()) value.fail("must name a file, 'vdi', 'png' or 'cinema'");
   ifThere(value, "latest", [&](const JsonValue& latest) {
     run.latest = latest.flag();
-    if (run.latest && !run.vdi && !run.png) latest.fail("needs 'vdi' or 'png', whose newest files it links");
+    if (!run.latest) return;
+    if (!run.vdi && !run.png) latest.fail("needs 'vdi' or 'png', whose newest files it links");
+    requireDistinct(latest, FilePattern("latest{timestep}"), run);
   });
 }
 
@@ -465,6 +489,13 @@ double numberOf(const JsonValue& value, const Setting& setting) {
   }
 }
 
+void readSetting(const JsonValue& object, const Setting& setting, GenerateSettings& settings) {
+  ifThere(object, setting.key, [&](const JsonValue& value) {
+    const double number = numberOf(value, setting);
+    placed(value, [&] { setting.set(settings, number); });
+  });
+}
+
 void readSettings(const JsonValue& document, GenerateSettings& settings) {
   settings.samplesPerVoxel = automaticRate;
   ifThere(document, "resolution", [&](const JsonValue& value) {
@@ -473,22 +504,81 @@ void readSettings(const JsonValue& document, GenerateSettings& settings) {
     settings.width = static_cast<int>(sides[0].whole(1, View::maxSide));
     settings.height = static_cast<int>(sides[1].whole(1, View::maxSide));
   });
-  for (const Setting& setting : settingsTable()) {
-    ifThere(document, setting.key, [&](const JsonValue& value) {
-      const double number = numberOf(value, setting);
-      placed(value, [&] { setting.set(settings, number); });
-    });
-  }
+  for (const Setting& setting : settingsTable()) readSetting(document, setting, settings);
   placed(document, [&] { validate(settings); });
+}
+
+/// The entries that the document has for all fields, and each field for itself.
+void readShown(const JsonValue& object, RunField& field) {
+  ifThere(object, "association", [&](const JsonValue& value) { field.cells = areCells(value); });
+  ifThere(object, "component", [&](const JsonValue& value) { field.component = componentOf(value); });
+  ifThere(object, "missing", [&](const JsonValue& value) { field.missing = missingOf(value); });
+  ifThere(object, "colors", [&](const JsonValue& value) { field.colors = colorsOf(value); });
+  GenerateSettings settings;
+  settings.interpolation = field.interpolation;
+  readSetting(object, settingsTable()[indexOfSetting("InterpolationType")], settings);
+  field.interpolation = settings.interpolation;
+}
+
+/// One of several fields, which has the document's entries where it has none of its own.
+RunField listedFieldOf(const JsonValue& value, RunField field) {
+  if (value.isText()) {
+    field.array = arrayNameOf(value);
+  } else {
+    value.requireObject(fieldsOf("/fields/*"));
+    field.array = arrayNameOf(value.at("field"));
+    readShown(value, field);
+    if (const std::optional<JsonValue> name = value.find("name")) {
+      field.name = fileNameOf(*name, "field");
+      return field;
+    }
+  }
+  field.name = field.array;
+  if (!namesFiles(field.name))
+    value.fail(fmt::format("files can't have this array's name; add a 'name' of {}", nameRule));
+  return field;
+}
+
+void readFields(const JsonValue& document, Run& run) {
+  RunField common;
+  readShown(document, common);
+  const std::optional<JsonValue> list = document.find("fields");
+  if (!list) {
+    common.array = arrayNameOf(document.at("field"));
+    run.fields = {std::move(common)};
+    return;
+  }
+  ifThere(document, "field", [](const JsonValue& one) { one.fail("can't be combined with 'fields'"); });
+  constexpr std::size_t most = 64;
+  run.fields.clear();
+  for (const JsonValue& item : list->items()) {
+    if (run.fields.size() == most) list->fail(fmt::format("a run can have at most {} fields", most));
+    RunField field = listedFieldOf(item, common);
+    const auto hasName = [&](const RunField& other) { return other.name == field.name; };
+    if (std::ranges::any_of(run.fields, hasName))
+      item.fail(fmt::format("another field has the name '{}'; a 'name' tells them apart", field.name));
+    run.fields.push_back(std::move(field));
+  }
+  if (run.fields.empty()) list->fail("must have a field");
+}
+
+/// The numbers that stand for missing values in an array: those of the first field that shows it, else the
+/// document's.
+std::vector<double> missingIn(const std::string& array, const JsonValue& document, const Run& run) {
+  const auto shows = [&](const RunField& field) { return field.array == array; };
+  const auto shown = std::ranges::find_if(run.fields, shows);
+  if (shown != run.fields.end()) return shown->missing;
+  const std::optional<JsonValue> common = document.find("missing");
+  return common ? missingOf(*common) : std::vector<double>();
 }
 
 /// The fields of the whole document.
 std::vector<std::string> documentFields() {
   std::vector<std::string> fields{
-      "$schema",    "field",         "association", "component", "missing",        "every",
-      "every_time", "every_seconds", "when",        "max_share", "max_device_mib", "max_host_mib",
-      "existing",   "camera",        "cameras",     "orbit",     "colors",         "resolution",
-      "output",     "stream",        "log",         "isolation"};
+      "$schema",      "field",      "fields",        "association", "component", "missing",
+      "every",        "every_time", "every_seconds", "when",        "max_share", "max_device_mib",
+      "max_host_mib", "existing",   "camera",        "cameras",     "orbit",     "colors",
+      "resolution",   "output",     "stream",        "log",         "isolation"};
   for (const Setting& setting : settingsTable()) fields.emplace_back(setting.key);
   return fields;
 }
@@ -498,6 +588,7 @@ std::vector<std::string> documentFields() {
 const std::map<std::string, std::vector<std::string>>& runFields() {
   static const std::map<std::string, std::vector<std::string>> fields{
       {"", documentFields()},
+      {"/fields/*", {"field", "name", "association", "component", "missing", "colors", "interpolation"}},
       {"/when", {"max", "min", "mean", "change", "association", "component", "above", "below"}},
       {"/cameras/*", {"name", "camera", "orbit"}},
       {"/camera", {"position", "focal_point", "view_up", "view_angle", "parallel_scale"}},
@@ -518,22 +609,26 @@ Run parseRun(std::string_view text, const std::string& name) {
   document.requireObject(fieldsOf(""));
   Run run;
   ifThere(document, "$schema", [](const JsonValue& value) { (void)value.text(); });
-  run.field = arrayNameOf(document.at("field"));
-  ifThere(document, "association", [&](const JsonValue& value) { run.cells = areCells(value); });
-  ifThere(document, "component", [&](const JsonValue& value) { run.component = componentOf(value); });
-  ifThere(document, "missing", [&](const JsonValue& value) { run.missing = missingOf(value); });
+  readFields(document, run);
   readTriggers(document, run);
+  if (run.when) run.when->missing = missingIn(run.when->field, document, run);
   ifThere(document, "existing", [&](const JsonValue& value) { run.existing = existingOf(value); });
   readCameras(document, run);
-  ifThere(document, "colors", [&](const JsonValue& value) { run.colors = colorsOf(value); });
   readSettings(document, run.settings);
   ifThere(document, "stream", [&](const JsonValue& value) { run.stream = streamOf(value); });
   ifThere(document, "output", [&](const JsonValue& value) { readOutput(value, run); });
   ifThere(document, "log", [&](const JsonValue& value) { run.log = logOf(value); });
   ifThere(document, "isolation", [&](const JsonValue& value) { run.isolation = isolationOf(value); });
-  if (run.cameras.size() > 1 && run.stream && !run.vdi && !run.makesPictures())
-    document.fail("several viewpoints need an 'output': the stream shows only the first");
-  if (!run.vdi && !run.makesPictures() && !run.stream) run.vdi = FilePattern("vdi_{timestep:06d}.vdi");
+  if (run.stream && !run.vdi && !run.makesPictures()) {
+    if (run.cameras.size() > 1)
+      document.fail("several viewpoints need an 'output': the stream shows only the first");
+    if (run.fields.size() > 1)
+      document.fail("several fields need an 'output': the stream shows only the first");
+  }
+  if (!run.vdi && !run.makesPictures() && !run.stream) {
+    run.vdi = FilePattern("vdi_{timestep:06d}.vdi");
+    requireDistinct(document, *run.vdi, run);
+  }
   return run;
 }
 

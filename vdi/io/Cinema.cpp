@@ -14,12 +14,14 @@ namespace vdi::io {
 
 namespace {
 
-constexpr std::string_view columns = "time,phi,theta,FILE";
-constexpr std::ptrdiff_t commas = 3;
+std::string_view columnsOf(bool hasFields) {
+  return hasFields ? "time,phi,theta,field,FILE" : "time,phi,theta,FILE";
+}
 
 }  // namespace
 
-CinemaIndex::CinemaIndex(std::filesystem::path folder, bool keep) : folder_(std::move(folder)) {
+CinemaIndex::CinemaIndex(std::filesystem::path folder, bool keep, bool hasFields)
+    : folder_(std::move(folder)), hasFields_(hasFields) {
   std::error_code error;
   if (keep && std::filesystem::is_regular_file(path(), error)) read();
 }
@@ -27,6 +29,7 @@ CinemaIndex::CinemaIndex(std::filesystem::path folder, bool keep) : folder_(std:
 void CinemaIndex::read() {
   const std::vector<std::byte> bytes = InputFile(path()).readAll();
   std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const std::string_view columns = columnsOf(hasFields_);
   bool isFirst = true;
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
@@ -34,7 +37,8 @@ void CinemaIndex::read() {
     text.remove_prefix(std::min(end + 1, text.size()));
     if (line.ends_with('\r')) line.remove_suffix(1);
     if (line.empty()) continue;
-    const bool isSound = isFirst ? line == columns : std::ranges::count(line, ',') == commas;
+    const bool isSound =
+        isFirst ? line == columns : std::ranges::count(line, ',') == std::ranges::count(columns, ',');
     if (!isSound) {
       throw Error(ErrorCode::Format, fmt::format("isn't an index with the columns {}", columns),
                   path().string());
@@ -45,7 +49,9 @@ void CinemaIndex::read() {
 }
 
 void CinemaIndex::add(const CinemaPicture& picture) {
-  put(picture.file, fmt::format("{},{},{},{}", picture.time, picture.phi, picture.theta, picture.file));
+  const std::string field = hasFields_ ? picture.field + "," : "";
+  put(picture.file,
+      fmt::format("{},{},{},{}{}", picture.time, picture.phi, picture.theta, field, picture.file));
 }
 
 void CinemaIndex::put(const std::string& file, std::string line) {
@@ -58,7 +64,7 @@ void CinemaIndex::put(const std::string& file, std::string line) {
 }
 
 void CinemaIndex::write() const {
-  std::string text(columns);
+  std::string text(columnsOf(hasFields_));
   text += '\n';
   for (const std::string& line : lines_) text += line + '\n';
   writeAtomically(path(), std::as_bytes(std::span(text)));

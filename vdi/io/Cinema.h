@@ -8,20 +8,22 @@
 
 namespace vdi::io {
 
-/// A picture and its viewpoint.
+/// A picture, its viewpoint and its field.
 struct CinemaPicture {
-  double time = 0.0;   // of the simulation
-  double phi = 0.0;    // degrees: azimuth
-  double theta = 0.0;  // degrees: elevation
-  std::string file;    // relative to the database's folder
+  double time = 0.0;       // of the simulation
+  double phi = 0.0;        // degrees: azimuth
+  double theta = 0.0;      // degrees: elevation
+  std::string file;        // relative to the database's folder
+  std::string field = {};  // without commas and line ends; used if the index has fields
 };
 
-/// data.csv in the database's folder: a line for each picture, with the columns time, phi, theta and FILE.
+/// data.csv in the database's folder: a line for each picture, with the columns time, phi, theta and FILE,
+/// and before the last one field, if the index has several.
 class CinemaIndex {
  public:
   /// With `keep`, begins with the pictures of an existing index. Throws Error: Io as InputFile, Format for an
   /// index that has other columns.
-  CinemaIndex(std::filesystem::path folder, bool keep);
+  CinemaIndex(std::filesystem::path folder, bool keep, bool hasFields = false);
 
   /// Adds the picture, or replaces the one with the same file. `write` stores the change.
   void add(const CinemaPicture& picture);
@@ -34,6 +36,7 @@ class CinemaIndex {
   void read();
 
   std::filesystem::path folder_;
+  bool hasFields_;
   std::vector<std::string> lines_;             // of pictures
   std::map<std::string, std::size_t> lineOf_;  // by file
 };

@@ -69,8 +69,10 @@ RunStart startFrom(const Json& line) {
   RunStart start;
   if (line.contains("scripts")) {
     start.scripts = line.at("scripts").get<std::vector<std::string>>();
+  } else if (line.contains("fields")) {
+    start.fields = line.at("fields").get<std::vector<std::string>>();
   } else {
-    start.field = line.at("field").get<std::string>();
+    start.fields = {line.at("field").get<std::string>()};
   }
   start.ranks = line.at("ranks").get<int>();
   start.unixTime = line.at("unix_time").get<std::int64_t>();
@@ -82,6 +84,7 @@ FrameRecord frameFrom(const Json& line) {
   FrameRecord record;
   record.step = line.at("step").get<std::int64_t>();
   record.time = line.at("time").is_null() ? std::nan("") : line.at("time").get<double>();
+  record.field = line.value("field", "");
   record.camera = line.value("camera", "");
   record.milliseconds = line.at("ms").get<double>();
   record.stages = stagesFrom(line.at("stages"));
@@ -157,8 +160,8 @@ std::string onOneLine(std::string text) {
 }  // namespace
 
 std::string subjectOf(const RunStart& start) {
-  if (start.scripts.empty()) return start.field;
   std::string names;
+  for (const std::string& field : start.fields) names += (names.empty() ? "" : ", ") + field;
   for (const std::string& script : start.scripts)
     names += (names.empty() ? "" : ", ") + std::filesystem::path(script).filename().string();
   return names;
@@ -218,10 +221,12 @@ void RunSummary::add(const FrameRecord& record) {
 std::string jsonLine(const RunStart& start) {
   JsonObject line;
   line.add("event", jsonOf("start"));
-  if (start.scripts.empty()) {
-    line.add("field", jsonOf(start.field));
-  } else {
+  if (!start.scripts.empty()) {
     line.add("scripts", listOf(start.scripts));
+  } else if (start.fields.size() == 1) {
+    line.add("field", jsonOf(start.fields.front()));
+  } else {
+    line.add("fields", listOf(start.fields));
   }
   line.add("ranks", jsonOf(start.ranks));
   line.add("unix_time", jsonOf(start.unixTime));
@@ -232,6 +237,7 @@ std::string jsonLine(const RunStart& start) {
 std::string jsonLine(const FrameRecord& record) {
   JsonObject line;
   line.add("event", jsonOf("frame")).add("step", jsonOf(record.step)).add("time", jsonOf(record.time));
+  if (!record.field.empty()) line.add("field", jsonOf(record.field));
   if (!record.camera.empty()) line.add("camera", jsonOf(record.camera));
   line.add("ms", jsonOf(rounded(record.milliseconds)));
   line.add("stages", stagesJson(record.stages));
@@ -282,6 +288,7 @@ std::string textLine(const RunStart& start) {
 
 std::string textLine(const FrameRecord& record) {
   std::string line = fmt::format("step {}, time {:g}", record.step, record.time);
+  if (!record.field.empty()) line += ", " + record.field;
   if (!record.camera.empty()) line += ", " + record.camera;
   line += fmt::format(": {:.1f} ms", record.milliseconds);
   if (!record.error.empty()) return line + ", failed: " + onOneLine(record.error);

@@ -30,7 +30,7 @@ std::vector<StageTime> stagesOf(std::span<const RankReport> reports);
 
 /// The beginning of a run.
 struct RunStart {
-  std::string field;  // the array that a run without scripts shows
+  std::vector<std::string> fields;  // the names of those that a run without scripts shows
   int ranks = 1;
   std::int64_t unixTime = 0;  // seconds
   bool isIsolated = false;    // other processes make the frames; times are theirs, not the simulation's
@@ -38,12 +38,13 @@ struct RunStart {
   bool operator==(const RunStart&) const = default;
 };
 
-/// The field or the names of the scripts, for people.
+/// The names of the fields or of the scripts, for people.
 std::string subjectOf(const RunStart& start);
 
 struct FrameRecord {
   std::int64_t step = 0;
   double time = 0.0;
+  std::string field;                // the field's name, if the run has several
   std::string camera;               // or the name of the script's filter; empty: the run's only one
   double milliseconds = 0.0;        // duration of the frame on the first rank
   std::vector<StageTime> stages;    // of a failed frame: none
