@@ -61,7 +61,7 @@ stream::LiveOptions liveOptionsOf(const config::RunStream& run) {
           .embedders = run.embedIn,
           .megabits = run.megabits,
           .isSteered = run.steer,
-          .page = page::emptyPage("Live"),
+          .page = page::emptyPage(run.title),
           .programName = "vdi_catalyst"};
 }
 

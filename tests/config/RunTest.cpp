@@ -163,7 +163,7 @@ TEST_CASE("everything at once") {
     "log": {"json": "run.jsonl", "text": "run.log"},
     "stream": {"host": "::1", "port": 8080, "token_file": "t", "link_file": "l", "certificate": "c", "key": "k",
                "origins": ["https://a.example"], "embed_in": ["https://b.example", "http://c.example"],
-               "megabits": 100, "steer": true, "steering_log": "s"}})",
+               "title": "Run 7", "megabits": 100, "steer": true, "steering_log": "s"}})",
                            "vdi.json");
   CHECK(run.fields[0].cells == std::optional<bool>(false));
   CHECK(run.fields[0].component == 2);
@@ -181,6 +181,7 @@ TEST_CASE("everything at once") {
   CHECK(run.stream->port == 8080);
   CHECK(run.stream->origins == std::vector<std::string>{"https://a.example"});
   CHECK(run.stream->embedIn == std::vector<std::string>{"https://b.example", "http://c.example"});
+  CHECK(run.stream->title == "Run 7");
   CHECK(run.stream->megabits == 100.0);
   CHECK(run.stream->steer);
   CHECK(run.stream->steeringLog == "s");

@@ -7,6 +7,7 @@ import stat
 import subprocess
 import sys
 import time
+import urllib.request
 
 from pvtest import *  # noqa: F403
 
@@ -43,6 +44,7 @@ image.Resolution = [160, 120]
 image.CameraPosition = [40, 30, 50]
 extractor = simple.CreateExtractor("VDIStream", image, registrationName="stream")
 extractor.Writer.LinkFile = link_file
+extractor.Writer.Title = "Run <7>"
 # The extractor of files writes the same at the last of the scene's steps.
 files = simple.CreateExtractor("VDI", image, registrationName="files")
 files.Writer.FileName = "stream_%s.vdi" % name
@@ -54,6 +56,8 @@ for number, supersegments in enumerate((12, 5)):
         with open(link_file) as file:
             link = file.read().strip()
         check(stat.S_IMODE(os.stat(link_file).st_mode) == 0o600, "only the owner of the link's file can read it")
+        page = urllib.request.urlopen(link.split("#")[0], timeout=60).read()
+        check(b"<title>Run &lt;7&gt;</title>" in page, "the page has its title")
         check("#token=" in link and link.startswith("http://127.0.0.1:"), "the link has host, port and token")
     with open(os.path.join(OUTPUT, "stream_%s.vdi" % name), "rb") as file:
         check(arrives(link, file.read()), "a viewer gets VDI %d as the extractor of files writes it" % number)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.request
 
 vdi, program = sys.argv[1:]
 PATIENCE = 150
@@ -37,7 +38,7 @@ with tempfile.TemporaryDirectory() as name:
     link = folder / "vdi-stream.link"
     port = free_port()
     run = json.dumps({"field": "V", "resolution": [96, 54], "colors": {"range": [0, 1], "opacities": [[0, 0], [1, 1]]},
-                      "stream": {"port": port}})
+                      "stream": {"port": port, "title": "Run 7"}})
     environment = {**os.environ, "VDI_OUTPUT": name, "VDI_TOKEN": TOKEN}
     running = []
 
@@ -53,6 +54,8 @@ with tempfile.TemporaryDirectory() as name:
         until(lambda: link.exists() or first.poll() is not None, "a link")
         check(first.poll() is None, "the simulation runs")
         check(link.read_text() == f"http://127.0.0.1:{port}/\n", "the link has no token that the user has set")
+        page = urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=PATIENCE).read()
+        check(b"<title>Run 7</title>" in page, "the page has its title")
         receiver = start(vdi, "receive", f"http://127.0.0.1:{port}/", "-o", got, "--patience", str(PATIENCE),
                          stdout=subprocess.DEVNULL)
         until(lambda: frames() >= 2, "frames")

@@ -86,6 +86,7 @@ struct RunStream {
   std::string key;
   std::vector<std::string> origins;                // of other sites' pages that may connect
   std::vector<std::string> embedIn;                // origins of sites that may show the page in a frame
+  std::string title = "Live";                      // of the page and its tab
   double megabits = 0.0;                           // rate to each viewer in Mbit/s; 0: no limit
   bool steer = false;                              // viewers may change the run
   std::string steeringLog = "vdi-steering.jsonl";  // gets a line for each change; empty: none

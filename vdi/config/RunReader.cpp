@@ -454,6 +454,7 @@ std::optional<RunStream> streamOf(const JsonValue& value) {
   ifThere(value, "key", [&](const JsonValue& file) { stream.key = file.text(); });
   ifThere(value, "origins", [&](const JsonValue& origins) { stream.origins = originsOf(origins); });
   ifThere(value, "embed_in", [&](const JsonValue& origins) { stream.embedIn = originsOf(origins); });
+  ifThere(value, "title", [&](const JsonValue& title) { stream.title = title.text(); });
   ifThere(value, "megabits", [&](const JsonValue& rate) { stream.megabits = positiveOf(rate); });
   ifThere(value, "steer", [&](const JsonValue& steer) { stream.steer = steer.flag(); });
   ifThere(value, "steering_log", [&](const JsonValue& file) {
@@ -596,8 +597,8 @@ const std::map<std::string, std::vector<std::string>>& runFields() {
       {"/colors", {"preset", "file", "name", "range", "opacities", "unit_distance"}},
       {"/output", {"vdi", "png", "cinema", "latest"}},
       {"/stream",
-       {"host", "port", "token_file", "link_file", "certificate", "key", "origins", "embed_in", "megabits",
-        "steer", "steering_log"}},
+       {"host", "port", "token_file", "link_file", "certificate", "key", "origins", "embed_in", "title",
+        "megabits", "steer", "steering_log"}},
       {"/log", {"json", "text"}},
       {"/isolation", {"restart", "patience"}},
   };

@@ -39,12 +39,14 @@ vtkStandardNewMacro(vtkVDIStreamWriter);
 
 vtkVDIStreamWriter::vtkVDIStreamWriter() {
   this->vtkVDIStreamWriter::SetHost("127.0.0.1");
+  this->vtkVDIStreamWriter::SetTitle("Live");
 }
 
 vtkVDIStreamWriter::~vtkVDIStreamWriter() {
   this->vtkVDIStreamWriter::SetHost(nullptr);
   this->vtkVDIStreamWriter::SetTokenFile(nullptr);
   this->vtkVDIStreamWriter::SetLinkFile(nullptr);
+  this->vtkVDIStreamWriter::SetTitle(nullptr);
   this->vtkVDIStreamWriter::SetCertificate(nullptr);
   this->vtkVDIStreamWriter::SetKey(nullptr);
   this->vtkVDIStreamWriter::SetOrigins(nullptr);
@@ -79,7 +81,7 @@ void vtkVDIStreamWriter::Start() {
                                .embedders = wordsOf(this->EmbedIn),
                                .megabits = std::max(this->Rate, 0.0),
                                .isSteered = this->Steer,
-                               .page = vdi::page::emptyPage("Live"),
+                               .page = vdi::page::emptyPage(textOf(this->Title)),
                                .programName = "VDIStream"});
 }
 

@@ -41,6 +41,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
   vtkGetFilePathMacro(TokenFile);
   vtkSetFilePathMacro(LinkFile);  // gets the link; none: no such file
   vtkGetFilePathMacro(LinkFile);
+  vtkSetStringMacro(Title);  // of the page and its tab
+  vtkGetStringMacro(Title);
   vtkSetMacro(Rate, double);  // Mbit a second to each viewer; 0: no limit
   vtkGetMacro(Rate, double);
   vtkSetFilePathMacro(Certificate);  // PEM; with Key, the server uses TLS
@@ -88,6 +90,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIStreamWriter : public vtkWriter {
   int Port = 0;
   char* TokenFile = nullptr;
   char* LinkFile = nullptr;
+  char* Title = nullptr;
   double Rate = 0.0;
   char* Certificate = nullptr;
   char* Key = nullptr;
