@@ -147,10 +147,21 @@ values = [(x * 200 + y * 90) % 4000 for z in range(6) for y in range(8) for x in
 open("v.raw", "wb").write(b"header" + struct.pack(">480H", *values))
 json.dump({"file": "v.raw", "dims": [10, 8, 6], "type": "u16", "endianness": "big", "skip": 6, "association": "cell"},
           open("v.json", "w"))
+for fill in 0, 7001:
+    filled = [fill if i % 13 == 0 else value + 1 for i, value in enumerate(values)]
+    open(f"f{fill}.raw", "wb").write(struct.pack("<480H", *filled))
+    json.dump({"file": f"f{fill}.raw", "dims": [10, 8, 6], "type": "u16"}, open(f"f{fill}.json", "w"))
 json.dump({"file": "v.raw", "dims": [10, 8, 7], "type": "u16"}, open("long.json", "w"))
 json.dump({"file": "v.raw", "dims": [10, 8, 6], "type": "u12"}, open("type.json", "w"))
 json.dump({"file": "v.raw", "dims": [10, 8, 6], "type": "u16", "spacin": [1, 1, 1]}, open("field.json", "w"))
 P
+# Missing values count neither in the picture nor in its range of colours, whichever number stands for them.
+for fill in 0 7001; do
+  works "missing values" "$vdi" generate --raw f$fill.json --missing $fill --resolution 40x30 --flat missing$fill.png
+done
+cmp missing0.png missing7001.png || fail "the number that stands for missing values shows"
+works "no missing values" "$vdi" generate --raw f0.json --resolution 40x30 --flat filled.png
+! cmp -s missing0.png filled.png || fail "--missing leaves nothing out"
 # Each time step equals a run with that step alone, with the first step's camera and transfer function. The first volume is
 # big-endian, behind a header.
 python3 - <<'P'

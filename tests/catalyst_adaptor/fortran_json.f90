@@ -21,12 +21,13 @@ program fortran_json
     call mpi_abort(mpi_comm_world, 2, error)
   if (c_associated(vdi)) call mpi_abort(mpi_comm_world, 3, error)
   code = vdi_catalyst_initialize_json(mpi_comm_world, '{"field": "V", "every": 2, "resolution": [64, 48], ' // &
-    '"when": {"max": "P", "above": 3.9}, "output": "' // trim(folder) // '/f_{timestep}.vdi"}' // c_null_char, vdi)
+    '"when": {"min": "P", "above": 3.9}, "output": "' // trim(folder) // '/f_{timestep}.vdi"}' // c_null_char, vdi)
   blocks(1)%cells = n
   blocks(1)%origin = [real(rank * n, c_double), 0.0_c_double, 0.0_c_double]
   code = code + vdi_catalyst_set_blocks(vdi, 1, blocks)
   code = code + vdi_catalyst_set_array(vdi, "V" // c_null_char, vdi_catalyst_f64, vdi_catalyst_cells, [c_loc(values)])
-  ! The run's condition: each rank puts a weight of 2 into the middle of the same cell of the first rank's block.
+  ! The run's condition: each rank puts a weight of 2 into the middle of the same cell of the first rank's block. Cells
+  ! without particles are missing.
   positions(:, 1) = [1.5_c_double, 2.5_c_double, 3.5_c_double]
   mass = 2
   particles%count = 1
@@ -37,6 +38,7 @@ program fortran_json
   particles%position_stride = 24
   particles%weights = c_loc(mass)
   code = code + vdi_catalyst_set_particles(vdi, "P" // c_null_char, particles)
+  code = code + vdi_catalyst_set_array_missing(vdi, "P" // c_null_char, vdi_catalyst_cells, 1, [0.0_c_double])
   do step = 0, 2
     do k = 1, n
       do j = 1, n

@@ -12,6 +12,7 @@
 #include "tests/Thrown.h"
 #include "tests/pipeline/PictureDifference.h"
 #include "vdi/comm/Funnel.h"
+#include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Flatten.h"
 #include "vdi/pipeline/VdiGenerator.h"
@@ -177,6 +178,33 @@ TEST_CASE("shaded, also nearest: the picture and VDI of N ranks are those of one
       CHECK(test::largestDifference(flatten(*vdi), flatten(*alone)) < (diffuse < 1.0 ? 2.0F : 2.5F));
       if (diffuse < 1.0) CHECK(test::largestDifference(flatten(*vdi), *truth) < 1.5F);
     }
+  }
+}
+
+TEST_CASE("missing values: holes in the picture, and N ranks make that of one") {
+  const comm::Communicator world = comm::Communicator::world();
+  VdiGenerator one(device(), comm::Communicator::serial());
+  VdiGenerator many(device(), comm::Communicator::world());
+  const TransferFunction function = test::threeHues(0.8 * test::topOf(ScalarType::U8));
+  for (const Joint joint : {Joint::SharedPoints, Joint::Cells}) {
+    auto decomposed =
+        test::dealt(world, "turbulence", {34, 30, 37}, {3, 3, 2}, Layout::Random, joint, ScalarType::U8);
+    auto whole = test::onOneRank("turbulence", {34, 30, 37}, {1, 1, 1}, ScalarType::U8, joint);
+    one.setBlocks(whole.mine);
+    const auto complete = one.renderVolume(test::oblique(false), function, test::smallSettings());
+    for (std::vector<Block>* blocks : {&decomposed.mine, &whole.mine}) {
+      for (Block& block : *blocks) leaveOutMissing(block, std::vector<double>{47.0, 55.0, 300.0});
+    }
+    many.setBlocks(decomposed.mine);
+    one.setBlocks(whole.mine);
+    const auto volume = many.renderVolume(test::oblique(false), function, test::smallSettings());
+    const auto vdi = many.generate(test::oblique(false), function, test::smallSettings());
+    if (world.rank() != 0) continue;
+    const auto truth = one.renderVolume(test::oblique(false), function, test::smallSettings());
+    REQUIRE(anythingSeen(*truth));
+    CHECK(test::largestDifference(*truth, *complete) > 20.0F);
+    CHECK(test::largestDifference(*volume, *truth) < 1.0F);
+    CHECK(test::largestDifference(flatten(*vdi), *truth) < 1.5F);
   }
 }
 

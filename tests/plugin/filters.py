@@ -328,4 +328,25 @@ content[len(content) // 2] ^= 0x10
 open(broken, "wb").write(content)
 check(errors_of(lambda: simple.VDIReader(FileNames=[broken]).UpdatePipeline()), "a file with a flipped bit is refused")
 check(np.array_equal(picture(vdi_of(wavelet)), flat), "after all that, a VDI is made as before")
+
+# The script brings its own all() and max().
+holes = simple.ProgrammableFilter(Input=wavelet)
+holes.Script = """
+for name, fill in (("filled", -9999), ("nan", float("nan"))):
+    values = inputs[0].PointData["RTData"].copy()
+    values[values > 200] = fill
+    output.PointData.append(values, name)
+"""
+unmarked = vdi_of(holes, ("POINTS", "nan"))
+marked = vdi_of(holes, ("POINTS", "filled"), MissingValues=[1e20, -9999])
+for one in (unmarked, marked):
+    one.UpdatePipeline()
+    one.LookupTable.RescaleTransferFunction(40, 200)
+    simple.GetOpacityTransferFunction(one.SelectInputScalars[1]).RescaleTransferFunction(40, 200)
+seen = picture(unmarked)
+check(np.array_equal(picture(marked), seen) and seen.max() > 60, "missing values are transparent, as NaN is")
+ranges = [one.FieldData[name].GetRange() for one, name in ((unmarked, "nan"), (marked, "filled"))]
+check(ranges[0] == ranges[1] and ranges[0][0] > 0, "they don't count in the range of the values shown: %s" % ranges)
+marked.MissingValues = []
+check(not np.array_equal(picture(marked), seen), "they are values like others where no number stands for them")
 finish()
