@@ -237,13 +237,9 @@ std::vector<Block> Fields::blocksOf(const std::string& name, bool cells, int com
   const int components = componentsOf(name, cells);
   const bool isHere =
       std::ranges::any_of(array->values, [](const StridedValues& values) { return values.first != nullptr; });
-  if (isHere && component == phase && components != 2) {
-    throw std::runtime_error("a phase needs two components, real and imaginary; '" + name + "' has " +
-                             std::to_string(components));
-  }
-  if (components > 1 && component >= components) {
-    throw std::runtime_error("component " + std::to_string(component) + " doesn't exist: '" + name +
-                             "' has " + std::to_string(components));
+  if (isHere) {
+    const std::string issue = componentIssue(component, components);
+    if (!issue.empty()) throw std::runtime_error("'" + name + "' " + issue);
   }
   const glm::dvec3 offset = offsetOf(name, cells);
   std::vector<double> allMissing = missingOf(name, cells);

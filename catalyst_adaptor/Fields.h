@@ -86,8 +86,9 @@ class Fields {
   /// number of its values. Their `data` are the addresses of this object's blocks.
   std::vector<Block> placesOf(const std::string& name, bool cells) const;
   /// The blocks that have the array, with its values. They read these where they are; nothing is copied.
-  /// `component` is one of the array's, `magnitude` or `phase`; `missing` are numbers that stand for missing
-  /// values, beside those of missingOf. Throws std::runtime_error if the array has no such component.
+  /// `component` is one of the array's, `magnitude`, `phase` or `together`; `missing` are numbers that stand
+  /// for missing values, beside those of missingOf. Throws std::runtime_error if the array has no such
+  /// component.
   std::vector<Block> blocksOf(const std::string& name, bool cells, int component,
                               std::span<const double> missing = {}) const;
 

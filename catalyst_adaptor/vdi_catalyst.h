@@ -199,9 +199,9 @@ typedef struct vdi_catalyst_strides {
 
 /* As vdi_catalyst_set_array, for values in another layout: interleaved with others, padded, z fastest, or
  * parts of a larger allocation. strides[i] and data[i] belong to block i. `components` is from 1 to
- * 16. With more than one, the array is one of vectors. A run shows their magnitude, a component, or
- * the phase of two components, the real and the imaginary part. For only one component, pass its
- * first value's address and components = 1.
+ * 16. With more than one, the array is one of vectors. A run shows their magnitude, a component,
+ * the phase of two components, the real and the imaginary part, or two or four together as colours
+ * and opacities. For only one component, pass its first value's address and components = 1.
  *
  * Values are read where they are, in any layout: a run without scripts never copies them on the host, nor
  * does VolumetricDepthImage in a script. If a filter of ParaView's own asks for a pointer to values

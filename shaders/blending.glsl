@@ -64,8 +64,9 @@ Sample crossed(Brick brick, uint k, float front, float back) {
     bool crosses = (front < position && back >= position) || (front >= position && back < position);
     if (!crosses) continue;
     vec4 material = params.isosurfaceMaterials[nearest];
-    if (shaded)
-      material.rgb *= lightAt(brick, mix(beginOf(k), endOf(k), (position - front) / (back - front)));
+    float place = mix(beginOf(k), endOf(k), (position - front) / (back - front));
+    if (colorCount > 0u) material.rgb = material.a * colorAt(brick, place);
+    if (shaded) material.rgb *= lightAt(brick, place);
     sum += (1.0 - sum.a) * material;
   }
   return Sample(sum.rgb / max(sum.a, 1.0e-30), opticalDepthOf(sum.a), sum.a, sum.a);

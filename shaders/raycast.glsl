@@ -155,6 +155,7 @@ vec3 placeAmongCells(Brick brick, uint k) {
   return max(coordinateOf(brick, middleOf(k)) * brick.cellScale + brick.cellOffset, vec3(0.0));
 }
 
+#include "colors.glsl"
 #include "shading.glsl"
 #include "blending.glsl"
 

@@ -53,8 +53,9 @@ vec3 lightAt(Brick brick, float place) {
   return light;
 }
 
-// A sample, or a part of one, under the light at its middle.
+// A sample, or a part of one, with the colour and under the light of its middle.
 Sample lit(Brick brick, float middle, Sample it) {
+  it = colored(brick, middle, it);
   if (shaded && it.opticalDepth > 0.0) it.color *= lightAt(brick, middle);
   return it;
 }

@@ -132,7 +132,8 @@ struct RunEngine::LoadedFrame {
   std::int64_t step = 0;
   double time = 0.0;
   double unitDistance = 1.0;
-  ScalarRange range;  // the colours' range, unless the run has one
+  ScalarRange range;    // the opacities' range, unless the run has one
+  ScalarRange colored;  // the colours'
   vdi::TimeStamp stamp;
 };
 
@@ -150,7 +151,8 @@ struct RunEngine::State {
 
   /// What a field keeps from frame to frame.
   struct FieldState {
-    std::optional<ScalarRange> firstRange;    // the colours' range, unless the field has one
+    std::optional<ScalarRange> firstRange;    // the opacities' range, unless the field has one
+    std::optional<ScalarRange> firstColored;  // the colours'
     std::optional<double> firstUnitDistance;  // the opacities', unless the field has one
     TransferFunction lastFunction;            // of the last frame, and what it has lost
     std::string lastLoss;
@@ -480,7 +482,7 @@ void RunEngine::record(runlog::FrameRecord& frame, const std::exception_ptr& fai
 /// Takes the viewers' requests. While they pause the simulation, makes a VDI for each view that they ask for.
 void RunEngine::steer(Fields& fields, Parameters& parameters, std::int64_t step, double time) {
   State& state = *state_;
-  const Steered steered{run_, state.schedule, state.fields.front().firstRange, parameters};
+  const Steered steered{run_, state.schedule, state.fields.front().firstColored, parameters};
   const Shown shown{run_.fields.front(), run_.cameras.front()};
   while (state.steering->take(steered, step, time)) {
     state.isAskedFor = true;
@@ -586,6 +588,9 @@ void RunEngine::prepare(Fields& fields, std::int64_t step, double time, const co
   frame.step = step;
   frame.time = time;
   frame.range = own.firstRange.value_or(range);
+  const ScalarRange& colored = generator.coloredRange();
+  if (!own.firstColored && colored.min < colored.max) own.firstColored = colored;
+  frame.colored = own.firstColored.value_or(colored);
   // The unit distance stays the first frame's, or opacities would jump where levels of refinement come and
   // go.
   const double unitDistance = unitDistanceOf(generator.scene().bounds, voxelVolume);
@@ -597,7 +602,7 @@ void RunEngine::prepare(Fields& fields, std::int64_t step, double time, const co
                    {.name = field.array,
                     .cells = cells,
                     .components = components,
-                    .component = components > 1 ? field.component : 0}};
+                    .component = components > 1 ? legendComponent(field.component, components) : 0}};
   });
   state.frame = std::move(frame);
 }
@@ -626,6 +631,8 @@ void RunEngine::deliver(const Shown& shown, bool isForFiles, runlog::FrameRecord
     if (isForFiles && run_.vdi) file = run_.vdi->path(frame.step, camera.name, field.name);
     from = run_.cameraAt(camera, frame.step, frame.time, generator.scene().bounds);
     function = field.colors.transferFunction(frame.range, frame.unitDistance);
+    if (frame.colored != frame.range)
+      function.colors = field.colors.transferFunction(frame.colored, frame.unitDistance).colors;
     if (!isRoot) return;
     if (function != own.lastFunction) {
       own.lastFunction = function;

@@ -114,6 +114,9 @@ struct CastParams {
   uint clipPlaneCount;
   uint shaded;  // 1: colours are shaded; a constant of the program
   uint blendMode;
+  VDI_ADDRESS(Vec4Array) colorNodes;  // red, green, blue, scalar; ascending; if blocks have one value for colours
+  uint colorNodeCount;
+  uint colorNodeStep;  // the largest power of 2 below their number
   uint takesNearest;  // 1: places have the values of the nearest texels; a constant of the program
   // Positions in the transfer table, ascending, and premultiplied colours and opacities.
   float isosurfacePositions[castMaxIsosurfaces];

@@ -32,6 +32,10 @@ struct Brick {
   uint pad2;
   uvec3 cellDims;
   uint pad3;
+  vec3 colorScale;  // colour = texel value of a page of colours * colorScale + colorOffset
+  uint pad4;
+  vec3 colorOffset;
+  uint pad5;
 };
 
 // Node of a kd-tree over bricks. Inner node: samples with p[axis] < split lie in child `first`, the others in

@@ -243,6 +243,7 @@ TEST_CASE("mistakes are told with their place") {
   refusedField(R"("when": {"max": "V", "above": "high"})", "/when/above: must be a number");
   refusedField(R"("when": {"max": "V", "above": 2, "below": 2})", "/when: never holds");
   refusedField(R"("when": {"max": "V", "above": 1, "component": 16})", "/when/component");
+  refusedField(R"("when": {"max": "V", "above": 1, "component": "together"})", "/when/component");
   refusedField(R"("when": {"max": "V", "above": 1, "association": "faces"})", "/when/association");
   refusedField(R"("max_share": 1.5)", "/max_share: is a share, 1 at most");
   refusedField(R"("max_share": 0)", "/max_share: must be > 0");

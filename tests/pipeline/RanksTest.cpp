@@ -208,6 +208,41 @@ TEST_CASE("missing values: holes in the picture, and N ranks make that of one") 
   }
 }
 
+TEST_CASE("colours of other values than opacities: the picture and VDI of N ranks are those of one") {
+  const comm::Communicator world = comm::Communicator::world();
+  const char* const fields[] = {"shells", "turbulence", "shells"};
+  for (const std::size_t colors : {std::size_t{1}, std::size_t{3}}) {
+    INFO(colors << " colours");
+    const glm::ivec3 size{34, 30, 37};
+    const auto coloredBlocks = [&](auto blocksOf) {
+      std::vector<Block> blocks = blocksOf("turbulence").mine;
+      for (std::size_t c = 0; c < colors; ++c) {
+        const test::Decomposed values = blocksOf(fields[c]);
+        for (std::size_t i = 0; i < blocks.size(); ++i) {
+          blocks[i].colors.push_back(values.mine[i]);
+          blocks[i].colors.back().displayed = {0.1, 0.4 + 0.2 * static_cast<double>(c)};
+        }
+      }
+      return blocks;
+    };
+    VdiGenerator many(device(), comm::Communicator::world());
+    many.setBlocks(coloredBlocks([&](const char* field) {
+      return test::dealt(world, field, size, {3, 2, 4}, Layout::Random, Joint::Gap, ScalarType::F32);
+    }));
+    const GenerateSettings settings = test::smallSettings();
+    const auto volume = many.renderVolume(test::oblique(), test::threeHues(0.8), settings);
+    const auto vdi = many.generate(test::oblique(), test::threeHues(0.8), settings);
+    if (world.rank() != 0) continue;
+    VdiGenerator one(device(), comm::Communicator::serial());
+    one.setBlocks(coloredBlocks([&](const char* field) { return test::onOneRank(field, size); }));
+    const auto truth = one.renderVolume(test::oblique(), test::threeHues(0.8), settings);
+    REQUIRE(anythingSeen(*truth));
+    CHECK(many.coloredRange() == one.coloredRange());
+    CHECK(test::largestDifference(*volume, *truth) < 1.0F);
+    CHECK(test::largestDifference(flatten(*vdi), *truth) < 1.0F);
+  }
+}
+
 TEST_CASE("a margin on N ranks: the lists of one rank, and its picture") {
   const comm::Communicator world = comm::Communicator::world();
   const bool root = world.rank() == 0;

@@ -3,6 +3,7 @@ and the picture is ParaView's own."""
 
 import numpy as np
 from pvtest import *  # noqa: F403
+from vtkmodules.util.numpy_support import numpy_to_vtk
 
 SIDE, UNIT = 24, 2.0
 
@@ -11,7 +12,7 @@ def compare(source, view, name, what, expected, least, **shown):
     """Takes over what the view shows with these properties, which the filter then has as `expected`."""
     theirs = paraview_volume(source, view, "POINTS", name, UNIT, keep_range=True, **shown)
     simple.SetActiveView(view)
-    image = vdi_filter(source, view, "POINTS", name, UNIT, Resolution=[0, 0])
+    image = vdi_filter(source, view, "POINTS", name, 0, Resolution=[0, 0])  # the unit distance is taken, too
     ours = picture(image)
     has = {key: getattr(image, key) for key in expected}
     check(has == expected, "%s: the first update takes %s" % (what, has))
@@ -38,6 +39,29 @@ for shade in (0, 1):
     ours, theirs = compare(source, view, "labels", "nearest, shaded" if shade else "nearest", {"InterpolationType": "Nearest"},
                            0.99, InterpolationType="Nearest", Shade=shade)
     check(ours[..., 1].max() == 0 and theirs[..., 1].max() == 0, "nearest labels: none is green")
+
+# Components together: red, green, blue and opacity, or colour and opacity. Neither opacities nor doubles' colours fill
+# their types' ranges, as Volume stretches both then.
+fields = [waves((SIDE,) * 3, spacing) / 255 for spacing in ((3, 2, 4), (2, 4, 3), (4, 3, 2), (5, 5, 4))]
+RGBA, PAIR = [0.1 + 0.8 * field for field in fields], [0.5 + fields[0], 0.2 + 0.6 * fields[3]]
+# Before 5.13, Volume shades by the gradient of red.
+SHADED = [RGBA[3], *RGBA[1:]]
+for name, components, kind, scale, shown in (
+        ("rgba", RGBA, "uint8", 255, {"MapScalars": 0}), ("rgba floats", RGBA, "float32", 1, {"MultiComponentsMapping": 1}),
+        ("rgba doubles", RGBA, "float64", 1, {"MapScalars": 0}),
+        ("rgba shaded", SHADED, "uint16", 65535, {"MapScalars": 0, "Shade": 1}),
+        ("pair", PAIR, "float32", 10, {"MapScalars": 0})):
+    simple.Hide(source, view)
+    image = image_of(labels, "labels")
+    array = numpy_to_vtk((np.stack([field.ravel() for field in components], axis=1) * scale).astype(kind), deep=True)
+    array.SetName(name)
+    image.GetPointData().AddArray(array)
+    source = producer_of(image)
+    source.UpdatePipeline()
+    set_colors(name, 0, scale)
+    compare(source, view, name, name, {"Component": -3, "ScalarOpacityUnitDistance": 1}, 0.99, **shown)
+said = errors_of_update(vdi_filter(source, view, "POINTS", "labels", UNIT, Component=-3))
+check("they must be two, colour and opacity, or four" in said, "one component isn't taken together: " + said)
 
 # Each property of ParaView's representation of uniform grids, 5.11 to 6.1: what the filter makes of it. A new version's
 # properties are added here, and where the filter can't honour them, to displayIssues.

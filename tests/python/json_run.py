@@ -293,6 +293,35 @@ def check_faces():
         assert (made(shape, None) == made([N, N, N], offset)).all(), axis
 
 
+def check_together():
+    """Two components together are colour and opacity, each by its own range; four are red, green, blue and opacity."""
+    field = 0.5 + 0.5 * np.sin(5 * x)[:, None, None] * np.cos(4 * x)[None, :, None] * np.ones(N)
+
+    def made(values, component="together"):
+        with Catalyst(MPI.COMM_WORLD, json={"field": "V", "component": component, "resolution": [48, 32],
+                                            "output": "together_{timestep}.vdi", "existing": "overwrite"}) as catalyst:
+            catalyst.set_blocks([Block(cells=(N, N, N), spacing=(1 / N,) * 3)])
+            catalyst.set_array("V", [values])
+            catalyst.execute(0)
+        return pv_vdi.read("together_0.vdi")
+
+    alone = made(field, 0).render()[0]
+    assert alone.max() > 0.5
+    pair = made(np.stack([300 + 50 * field, field], axis=-1))
+    assert np.allclose(pair.metadata["range"], [300 + 50 * field.min(), 300 + 50 * field.max()]), pair.metadata
+    assert np.abs(pair.render()[0] - alone).max() < 0.03
+    red, dark, half = (np.full(field.shape, value) for value in (255, 0, 127.5))
+    four = made((257 * np.stack([red, dark, half, 255 * field], axis=-1)).astype(np.uint16)).render()[0]
+    assert np.abs(four - four[..., 3:] * [1, 0, 0.5, 1]).max() < 0.01
+    assert np.abs(four[..., 3] - alone[..., 3]).max() < 0.01
+    try:
+        made(np.stack([field] * 3, axis=-1))
+    except CatalystError as error:
+        assert "they must be two, colour and opacity, or four" in str(error), error
+        return
+    raise AssertionError("three components are taken together")
+
+
 refused(SCRIPT, "no such field", json={"field": "V", "evry": 10})
 refused(SCRIPT, "none.json", json="none.json")
 run = {"field": "V", "every": 10, "resolution": [48, 32], "stream": {"link_file": "link"},
@@ -335,6 +364,7 @@ check_lost()
 check_threads()
 check_missing()
 check_faces()
+check_together()
 
 # Particles: one array or three, of any stride, weights and lengths for each or for all.
 places = np.random.default_rng(3).uniform(0.2, 0.8, (2000, 3))

@@ -39,7 +39,7 @@ struct RunField {
   std::string array;
   std::string name;             // as it appears in files' names; empty: the run's only field
   std::optional<bool> cells;    // none: as the simulation hands the array over
-  int component = -1;           // of a vector field: a component, magnitude or phase (ComponentValues.h)
+  int component = -1;           // of a vector field: one of them, or a special value of ComponentValues.h
   std::vector<double> missing;  // numbers that stand for missing values
   RunColors colors;
   Interpolation interpolation = Interpolation::Linear;

@@ -211,11 +211,15 @@ void readCameras(const JsonValue& document, Run& run) {
   if (turns && !areCounted) document.fail("an orbit's 'turn' goes with only one of 'every' and 'every_time'");
 }
 
-int componentOf(const JsonValue& value) {
+/// `isShown`: of the shown field, else of a condition's.
+int componentOf(const JsonValue& value, bool isShown) {
   constexpr std::int64_t last = 15;
   if (value.isText() && value.text() == "magnitude") return magnitude;
   if (value.isText() && value.text() == "phase") return phase;
-  if (value.isText()) value.fail("must be a number from 0 on, 'magnitude' or 'phase'");
+  if (value.isText() && value.text() == "together" && isShown) return together;
+  if (value.isText())
+    value.fail(isShown ? "must be a number from 0 on, 'magnitude', 'phase' or 'together'"
+                       : "must be a number from 0 on, 'magnitude' or 'phase'");
   return static_cast<int>(value.whole(0, last));
 }
 
@@ -255,7 +259,7 @@ RunCondition conditionOf(const JsonValue& value) {
   if (measures == 0) value.fail("must have 'max', 'min', 'mean' or 'change', with an array's name");
   ifThere(value, "association", [&](const JsonValue& kind) { condition.cells = areCells(kind); });
   ifThere(value, "component",
-          [&](const JsonValue& component) { condition.component = componentOf(component); });
+          [&](const JsonValue& component) { condition.component = componentOf(component, false); });
   ifThere(value, "above", [&](const JsonValue& bound) { condition.above = bound.number(); });
   ifThere(value, "below", [&](const JsonValue& bound) { condition.below = bound.number(); });
   if (!condition.above && !condition.below) value.fail("must have a bound, 'above' or 'below'");
@@ -512,7 +516,7 @@ void readSettings(const JsonValue& document, GenerateSettings& settings) {
 /// The entries that the document has for all fields, and each field for itself.
 void readShown(const JsonValue& object, RunField& field) {
   ifThere(object, "association", [&](const JsonValue& value) { field.cells = areCells(value); });
-  ifThere(object, "component", [&](const JsonValue& value) { field.component = componentOf(value); });
+  ifThere(object, "component", [&](const JsonValue& value) { field.component = componentOf(value, true); });
   ifThere(object, "missing", [&](const JsonValue& value) { field.missing = missingOf(value); });
   ifThere(object, "colors", [&](const JsonValue& value) { field.colors = colorsOf(value); });
   GenerateSettings settings;

@@ -163,6 +163,19 @@ void Block::setStrides(const ByteStrides& bytes) {
   if (!aligned || !arePacked(bytes, dims, sizeOf(type))) strides = bytes;
 }
 
+Block Block::withColors(std::size_t index) const {
+  const Block& values = colors[index];
+  Block block = *this;
+  block.type = values.type;
+  block.data = values.data;
+  block.strides = values.strides;
+  block.computed = values.computed;
+  block.displayed = values.displayed;
+  if (values.keepAlive) block.keepAlive = values.keepAlive;
+  block.colors.clear();
+  return block;
+}
+
 void Block::copyTo(const IndexBox& box, void* to) const {
   if (!computed) return copyTo(box, to, packedStrides(box.size(), sizeOf(type)));
   assert(!box.empty() && box == box.intersection(stored()));

@@ -102,6 +102,13 @@ struct Block {
   /// Offset of the values, in spacings, from the grid's points or cell centres. `origin` includes it.
   glm::dvec3 offset{0.0};
 
+  /// Values of the same type that give the colours, where `data` gives the opacities: one block, whose values
+  /// the transfer function colours, or three, which are red, green and blue. Of each, only type, data,
+  /// strides, computed, keepAlive and displayed count; VdiGenerator::setBlocks sets the rest. Empty: `data`
+  /// gives both. All blocks of all ranks have as many.
+  std::vector<Block> colors{};
+  glm::dvec2 displayed{0.0, 1.0};  // of red, green or blue: the values without light and in full light
+
   IndexBox stored() const { return {glm::ivec3(0), dims}; }
   IndexBox extended() const { return {-extra.lo, dims + extra.hi}; }
   std::span<const Patch> patchList() const {
@@ -121,6 +128,8 @@ struct Block {
   void moveValues(const glm::dvec3& spacings);
   /// Sets the strides of the values. Drops them if the values are packed and aligned.
   void setStrides(const ByteStrides& bytes);
+  /// A block of the same lattice with the values of colors[index].
+  Block withColors(std::size_t index) const;
   /// Copies the stored values of a box within stored(), [size.z][size.y][size.x], to memory that is aligned
   /// for them.
   void copyTo(const IndexBox& box, void* to) const;

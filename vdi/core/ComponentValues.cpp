@@ -1,5 +1,7 @@
 #include "vdi/core/ComponentValues.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -7,6 +9,7 @@
 #include <memory>
 #include <span>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace vdi {
@@ -129,14 +132,53 @@ class Computation : public ComputedValues {
   ScalarType type_;
 };
 
+/// The value that is full red, green or blue.
+double topOf(ComponentType type) {
+  return withZero(type, []<typename T>(T /*zero*/) {
+    return std::is_integral_v<T> ? static_cast<double>(std::numeric_limits<T>::max()) : 1.0;
+  });
+}
+
 }  // namespace
 
 std::size_t sizeOf(ComponentType type) {
   return isWide(type) ? sizeof(std::uint64_t) : sizeOf(scalarTypeOf(type));
 }
 
+std::string componentIssue(int component, int components) {
+  if (components == 1 && component >= magnitude) return {};  // it has only that one to show
+  if (component == phase && components != 2)
+    return fmt::format("has {} components; a phase needs two, real and imaginary", components);
+  if (component == together && components != 2 && components != 4)
+    return fmt::format(
+        "has {} components; to be used together, they must be two, colour and opacity, or four, "
+        "red, green, blue and opacity",
+        components);
+  if (component < together || component >= components)
+    return fmt::format("has {} components, so component {} doesn't exist", components, component);
+  return {};
+}
+
+int legendComponent(int component, int components) {
+  if (component != together) return component;
+  return components == 2 ? 0 : components - 1;
+}
+
 void showComponent(Block& block, const ComponentArray& array, int component) {
-  assert(component < array.components && (component != phase || array.components == 2));
+  assert(componentIssue(component, array.components).empty());
+  block.colors.clear();
+  if (component == together) {
+    const int opacity = array.components - 1;
+    std::vector<Block> colors(static_cast<std::size_t>(opacity));
+    for (int c = 0; c < opacity; ++c) {
+      Block& color = colors[static_cast<std::size_t>(c)];
+      showComponent(color, array, c);
+      color.displayed = {0.0, topOf(array.type)};
+    }
+    showComponent(block, array, opacity);
+    block.colors = std::move(colors);
+    return;
+  }
   const bool isOne = component >= 0 || (component == magnitude && array.components == 1);
   const std::byte* const first = array.first + std::max(component, 0) * array.componentStride;
   block.data = first;

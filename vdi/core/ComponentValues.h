@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "vdi/core/Block.h"
@@ -28,6 +29,7 @@ enum class ComponentType : std::uint32_t {
 /// Special values of a component's number, as in ScalarArray::component.
 constexpr int magnitude = -1;  // magnitude of all components
 constexpr int phase = -2;      // phase of two, real and imaginary: from -pi to pi, 0 for the number 0
+constexpr int together = -3;   // two: colour and opacity; four: red, green, blue and opacity (Block::colors)
 
 /// An array of vectors. Component c of value (x, y, z) lies at `first` + x * strides.x + y * strides.y + z *
 /// strides.z + c * componentStride, in bytes.
@@ -48,7 +50,9 @@ std::size_t sizeOf(ComponentType type);
 /// Makes the block show `component` of the array, which has a value at each of the block's places. Values are
 /// read in place, so the array must outlive the block. One component of a ScalarType is read unchanged; all
 /// else is computed as f64 at each read. `component` is a number below array.components, `magnitude`, or
-/// `phase` with two components; of a single component, `magnitude` is the component itself.
+/// `phase` with two components, or `together` with two or four; of a single component, `magnitude` is the
+/// component itself. Together, red, green and blue are shares of an integer type's largest value, or floats
+/// from 0 to 1.
 ///
 /// Missing values become NaN, which is transparent and counts in no range. So if the type has one of the
 /// array's missing numbers, one component is computed too: as f32 where floats hold all values of its type,
@@ -58,5 +62,11 @@ void showComponent(Block& block, const ComponentArray& array, int component);
 /// Makes a block with an array of stored values show NaN where they equal one of the numbers, by the rules of
 /// showComponent. The block isn't `computed`.
 void leaveOutMissing(Block& block, std::span<const double> missing);
+
+/// Empty if an array of so many components can show `component`; else the reason, to follow the array's name.
+std::string componentIssue(int component, int components);
+
+/// The component that a legend names: the coloured one of `together`.
+int legendComponent(int component, int components);
 
 }  // namespace vdi

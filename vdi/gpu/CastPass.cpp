@@ -81,7 +81,7 @@ ComputePipeline& CastPass::pipelineFor(const Program& program) {
       {program.program, static_cast<std::uint32_t>(pageCount), program.encoding, program.samplesAhead,
        program.lanesPerRay, program.cutAtGaps ? 1U : 0U, program.byNeed ? 1U : 0U,
        volume_->mayBeInfinite() ? 1U : 0U, volume_->reachesBeyondTable() ? 1U : 0U, program.shaded ? 1U : 0U,
-       program.blendMode, program.takesNearest ? 1U : 0U, program.hasPieces ? 1U : 0U});
+       program.blendMode, program.takesNearest ? 1U : 0U, program.hasPieces ? 1U : 0U, volume_->colors()});
   const Bound now{volume_->pagesVersion(), volume_->slabsVersion()};
   Bound& bound = bound_[&pipeline];
   if (bound != now) {

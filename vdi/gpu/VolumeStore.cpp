@@ -11,6 +11,7 @@
 #include <tuple>
 #include <utility>
 
+#include "shaders/shared/cast.h"
 #include "shaders/shared/slab.h"
 #include "vdi/core/BitCast.h"
 #include "vdi/core/Error.h"
@@ -99,7 +100,7 @@ void VolumeStore::setBlocks(std::span<const Block> blocks, const Scene& scene) {
   Step& step = steps_[shown_];
   try {
     lay(step, blocks, scene);
-    if (!step.pieces.empty()) upload_.run(step.pieces, step.pages);
+    if (!step.uploads.empty()) upload_.run(step.uploads, step.pages);
     finish(step);
   } catch (...) {
     step = {};
@@ -113,7 +114,7 @@ void VolumeStore::setNextBlocks(std::span<const Block> blocks, const Scene& scen
   try {
     lay(step, blocks, scene);
     onItsWay_ = std::async(std::launch::async | std::launch::deferred, [this, &step] {
-      if (!step.pieces.empty()) upload_.run(step.pieces, step.pages);
+      if (!step.uploads.empty()) upload_.run(step.uploads, step.pages);
     });
   } catch (...) {
     step = {};
@@ -165,8 +166,11 @@ void VolumeStore::lay(Step& step, std::span<const Block> blocks, const Scene& sc
   std::vector<VolumePiece> pieces;
   std::vector<PieceRange> piecesOf;  // pieces of each block
   std::map<ValuesKey, SharedValues> known;
+  std::uint32_t colors = 0;
   for (const Block& block : step.blocks) {
-    if (!block.owned.empty()) known[keyOf(block)].addOwn(block);
+    if (block.owned.empty()) continue;
+    known[keyOf(block)].addOwn(block);
+    colors = static_cast<std::uint32_t>(block.colors.size());
   }
   cutAll(*device_, known);
   step.ownTexels.clear();
@@ -186,16 +190,17 @@ void VolumeStore::lay(Step& step, std::span<const Block> blocks, const Scene& sc
     }
     piecesOf.push_back(*values.pieces);
   }
-  makePages(step, std::move(pieces));
+  makePages(step, std::move(pieces), colors);
+  layColors(step);
   layCells(step);
   layBricks(step, piecesOf, scene);
   upload_.begin(commands_);
 }
 
 /// Reuses the pages if their shapes are the same.
-void VolumeStore::makePages(Step& step, std::vector<VolumePiece> pieces) {
+void VolumeStore::makePages(Step& step, std::vector<VolumePiece> pieces, std::uint32_t colors) {
   const bool sameShapes =
-      pieces.size() == step.pieces.size() &&
+      pieces.size() == step.pieces.size() && colors == step.colors &&
       std::equal(pieces.begin(), pieces.end(), step.pieces.begin(),
                  [](const VolumePiece& a, const VolumePiece& b) { return a.samePlaceAs(b); });
   if (sameShapes) {
@@ -208,12 +213,39 @@ void VolumeStore::makePages(Step& step, std::vector<VolumePiece> pieces) {
   }
   step.pages.clear();
   step.pieces = std::move(pieces);
+  step.colors = colors;
   step.pagesVersion = ++pagesVersions_;
-  for (const PageShape& shape : placeInPages(*device_, step.pieces))
-    step.pages.emplace_back(device_, shape.extent, shape.format);
+  const std::vector<PageShape> shapes = placeInPages(*device_, step.pieces);
+  if (shapes.size() * (1 + colors) > shared::castMaxPages) {
+    throw Error(
+        ErrorCode::OutOfMemory,
+        fmt::format("{} components of this size don't fit {} textures", 1 + colors, shared::castMaxPages),
+        device_->name());
+  }
+  for (std::uint32_t i = 0; i <= colors; ++i) {
+    for (const PageShape& shape : shapes) step.pages.emplace_back(device_, shape.extent, shape.format);
+  }
   commands_.begin();
   for (const SampledImage& page : step.pages) commands_.clear(page);
   commands_.submitAndWait();
+}
+
+/// Lists the values to upload.
+void VolumeStore::layColors(Step& step) {
+  step.uploads = step.pieces;
+  const auto pagesEach = static_cast<std::uint32_t>(step.pages.size()) / (1 + step.colors);
+  for (std::uint32_t color = 0; color < step.colors; ++color) {
+    const Block* last = nullptr;
+    ValueMap values;
+    for (VolumePiece piece : step.pieces) {
+      piece.block = &piece.block->colors[color];
+      if (piece.block != last) values = valueMapOf(*piece.block, piece.block->ownBoxes());
+      last = piece.block;
+      piece.values = values;
+      piece.page += pagesEach * (1 + color);
+      step.uploads.push_back(piece);
+    }
+  }
 }
 
 void VolumeStore::layBricks(Step& step, std::span<const PieceRange> piecesOf, const Scene& scene) const {
@@ -248,6 +280,13 @@ void VolumeStore::layBricks(Step& step, std::span<const PieceRange> piecesOf, co
             static_cast<float>((piece.place[axis] + piece.dims[axis] - edge) / extent[axis]);
         brick.cellScale[axis] = static_cast<float>(extent[axis] / shared::cellSide);
         brick.cellOffset[axis] = static_cast<float>(-(piece.place[axis] + 0.5) / shared::cellSide);
+      }
+      for (std::uint32_t color = 0; color < step.colors; ++color) {
+        const ValueMap& values = step.uploads[step.pieces.size() * (1 + color) + index].values;
+        const glm::dvec2 ends = step.colors == 3 ? block.colors[color].displayed : glm::dvec2(0.0, 1.0);
+        brick.colorScale[static_cast<int>(color)] = static_cast<float>(values.scale / (ends.y - ends.x));
+        brick.colorOffset[static_cast<int>(color)] =
+            static_cast<float>((values.offset - ends.x) / (ends.y - ends.x));
       }
       brick.firstCell = step.cellPieces[index].firstCell;
       brick.cellDims = step.cellPieces[index].cellDims;
@@ -300,6 +339,7 @@ void VolumeStore::layCells(Step& step) const {
 void VolumeStore::finish(Step& step) {
   // The blocks' memory belongs to the caller after this call.
   step.blocks.clear();
+  step.uploads.clear();
   for (VolumePiece& piece : step.pieces) piece.block = nullptr;
   if (hasTable()) placeTable(step);
   runCells(step, true);

@@ -85,6 +85,8 @@ class VolumeStore {
   /// Smallest and largest texel of each macrocell, with the same indices; inverted where all are NaN.
   VkDeviceAddress cellRanges() const { return shown().rangeBuffer.address(); }
   std::span<const SampledImage> pages() const { return shown().pages; }
+  /// The number of values that give a place its colour (Block::colors); each has as many pages as the values.
+  std::uint32_t colors() const { return shown().colors; }
   /// Bytes of all values' texels, those of a next step included.
   std::uint64_t texelBytesHeld() const;
   /// Version of the pages: when it changes, descriptor sets that name them must be written again.
@@ -97,6 +99,10 @@ class VolumeStore {
   struct Step {
     std::vector<Block> blocks;  // kept until their values are copied
     std::vector<VolumePiece> pieces;
+    /// All values to upload: those of `pieces`, then for each of Block::colors the same pieces again, in
+    /// pages of the same shapes that follow.
+    std::vector<VolumePiece> uploads;
+    std::uint32_t colors = 0;  // number of Block::colors
     std::vector<SampledImage> pages;
     std::uint64_t pagesVersion = 0;
     std::vector<shared::Brick> bricks;  // leaves; placeTable sets the table fields
@@ -119,7 +125,8 @@ class VolumeStore {
   const Step& shown() const { return steps_[shown_]; }
   Step& next() { return steps_[1 - shown_]; }
   void lay(Step& step, std::span<const Block> blocks, const Scene& scene);
-  void makePages(Step& step, std::vector<VolumePiece> pieces);
+  void makePages(Step& step, std::vector<VolumePiece> pieces, std::uint32_t colors);
+  static void layColors(Step& step);
   void layBricks(Step& step, std::span<const PieceRange> piecesOf, const Scene& scene) const;
   void layCells(Step& step) const;
   void finish(Step& step);

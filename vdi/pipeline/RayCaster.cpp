@@ -1,7 +1,9 @@
 #include "vdi/pipeline/RayCaster.h"
 
 #include <algorithm>
+#include <bit>
 #include <cassert>
+#include <cstring>
 #include <ranges>
 
 #include "shaders/shared/quota.h"
@@ -70,6 +72,18 @@ std::byte* bytesOf(HostVector<T>& values) {
 
 }  // namespace
 
+void RayCaster::setColors(shared::CastParams& params, std::span<const ColorNode> nodes) {
+  if (nodes.empty()) return;
+  std::vector<glm::vec4> colors;
+  for (const ColorNode& node : nodes) colors.emplace_back(node.color, node.x);
+  const auto bytes = std::as_bytes(std::span(colors));
+  colorNodes_.reserve(device_, bytes.size(), gpu::MemoryKind::Upload);
+  std::memcpy(colorNodes_.mapped().data(), bytes.data(), bytes.size());
+  params.colorNodes = colorNodes_.address();
+  params.colorNodeCount = static_cast<std::uint32_t>(colors.size());
+  params.colorNodeStep = std::bit_floor(params.colorNodeCount - 1);
+}
+
 shared::CastParams RayCaster::prepare(const Inputs& inputs) {
   volume_.setTable(inputs.table, slabLength(inputs.lattice, inputs.table));
   shared::CastParams params = gpu::castGeometry(inputs.scene, inputs.view, inputs.lattice);
@@ -90,6 +104,7 @@ shared::CastParams RayCaster::prepare(const Inputs& inputs) {
   setRegion(params, inputs.settings.region, inputs.scene);
   setLights(params, inputs.settings.shading, inputs.view);
   setBlending(params, inputs.settings.blending, inputs.table);
+  setColors(params, inputs.colorNodes);
   params.takesNearest = inputs.settings.interpolation == Interpolation::Nearest ? 1U : 0U;
   params.cells = volume_.cells();
   params.ranges = volume_.cellRanges();

@@ -42,6 +42,7 @@ class RayCaster {
     bool cutAtGaps;
     bool runsOnly;  // one supersegment per run, without a search
     ListForm form;
+    std::span<const ColorNode> colorNodes{};  // if the blocks have one value for colours (Block::colors)
   };
   /// Called with the finished share; returning false ends the work early with the present result.
   using Progress = std::function<bool(double)>;
@@ -102,6 +103,7 @@ class RayCaster {
   };
   void castPixels(const Inputs& inputs, const Progress& progress, HostPool& pool,
                   std::span<const PixelArray> arrays);
+  void setColors(gpu::shared::CastParams& params, std::span<const ColorNode> nodes);
   gpu::shared::CastParams prepare(const Inputs& inputs);
   float levelOfNeed(gpu::shared::CastParams params, const Inputs& inputs);
   std::uint32_t bandsWanted() const;
@@ -127,6 +129,7 @@ class RayCaster {
   gpu::Buffer colors_;
   gpu::Buffer depths_;
   gpu::Buffer extremes_;
+  gpu::Buffer colorNodes_;
   HistogramBuffer histogram_;
   ListTimes times_;
 };

@@ -84,6 +84,52 @@ std::vector<Probe> globalProbes(const comm::Communicator& comm, const Scene& sce
   return probes;
 }
 
+/// Collective: the number of colours of all ranks' blocks (Block::colors). Throws unless they are equal.
+std::size_t globalColors(const comm::Communicator& comm, std::span<const Block> blocks) {
+  constexpr std::uint64_t none = 4;
+  std::array<std::uint64_t, 2> ends{0, 0};  // the most, and `none` less the fewest
+  for (const Block& block : blocks) {
+    const bool areAlike = std::ranges::all_of(
+        block.colors, [&](const Block& color) { return color.type == block.type; });  // textures' formats are
+    const std::uint64_t count = areAlike ? std::min<std::uint64_t>(block.colors.size(), none) : none;
+    ends = {std::max(ends[0], count), std::max(ends[1], none - count)};
+  }
+  comm.allReduceMax(ends);
+  const bool known = ends[0] == 0 || ends[0] == 1 || ends[0] == 3;
+  if (known && (ends[1] == 0 || ends[0] + ends[1] == none)) return ends[0];
+  throw Error(ErrorCode::InvalidArgument, "all blocks must have the same components, of one type");
+}
+
+/// Collective: gives the values that colour the blocks the layers that `complete` gives the blocks.
+template <typename Complete>
+std::vector<Block> completed(std::vector<Block> blocks, std::size_t colors, Complete complete) {
+  std::vector<std::vector<Block>> completedColors;
+  for (std::size_t c = 0; c < colors; ++c) {
+    std::vector<Block> values;
+    values.reserve(blocks.size());
+    for (const Block& block : blocks) values.push_back(block.withColors(c));
+    completedColors.push_back(complete(std::move(values)));
+  }
+  blocks = complete(std::move(blocks));
+  // The blocks' places alone decide how they are divided.
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    blocks[i].colors.clear();
+    for (std::vector<Block>& values : completedColors) blocks[i].colors.push_back(std::move(values[i]));
+  }
+  return blocks;
+}
+
+/// Collective: the range of the values that colour all ranks' blocks.
+ScalarRange globalColoredRange(const comm::Communicator& comm, std::span<const Block> blocks) {
+  ScalarRange own;
+  comm.together([&] {
+    for (const Block& block : blocks) own.include(ownRange(block.colors.front()));
+  });
+  std::array<double, 2> least{own.min, -own.max};
+  comm.allReduceMin(least);
+  return {least[0], -least[1]};
+}
+
 }  // namespace
 
 TimeSteps::Step TimeSteps::send(std::vector<Block> blocks, bool fillGhosts,
@@ -94,12 +140,16 @@ TimeSteps::Step TimeSteps::send(std::vector<Block> blocks, bool fillGhosts,
   requireUsableValues(comm_, blocks);
   thickenSheet(comm_, blocks);
   for (const Block& block : blocks) {
-    step.bytes += block.byteCount();
+    step.bytes += block.byteCount() * (1 + block.colors.size());
     step.doubles = step.doubles || block.type == ScalarType::F64;
   }
   step.blocks = blocks.size();
-  blocks = fillGhosts ? comm::exchangeGhosts(comm_, std::move(blocks))
-                      : comm::settleOwnership(comm_, std::move(blocks));
+  step.colors = globalColors(comm_, blocks);
+  blocks = completed(std::move(blocks), step.colors, [&](std::vector<Block> some) {
+    return fillGhosts ? comm::exchangeGhosts(comm_, std::move(some))
+                      : comm::settleOwnership(comm_, std::move(some));
+  });
+  if (step.colors == 1) step.colored = globalColoredRange(comm_, blocks);
   step.scene = comm::globalScene(comm_, localScene(blocks));  // allocates no memory
   step.probes = globalProbes(comm_, step.scene, blocks);
   comm_.together([&] { (volume_.*way)(blocks, step.scene); });

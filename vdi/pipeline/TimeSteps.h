@@ -28,7 +28,10 @@ class TimeSteps {
   void advance();
 
   const Scene& scene() const { return shown_.scene; }             // global
+  std::size_t colors() const { return shown_.colors; }            // Block::colors; equal on all ranks
   const ScalarRange& scalarRange() const { return ranges_.own; }  // global
+  /// The range of the values that the transfer function colours; global.
+  const ScalarRange& coloredRange() const { return shown_.colors == 1 ? shown_.colored : ranges_.own; }
   /// The part of that range that nearly all values fill, if that is a small one (SamplingRate.h). Equal on
   /// all ranks. Not collective.
   std::optional<ScalarRange> crowdedPart() const { return vdi::crowdedPart(ranges_.own, shown_.probes); }
@@ -44,6 +47,8 @@ class TimeSteps {
   struct Step {
     Scene scene;                // global
     std::vector<Probe> probes;  // global
+    std::size_t colors = 0;     // global
+    ScalarRange colored;        // global; of the values of one colour
     std::uint64_t blocks = 0;
     std::uint64_t bytes = 0;
     double uploadSeconds = 0.0;

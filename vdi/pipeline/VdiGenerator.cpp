@@ -135,7 +135,8 @@ struct VdiGenerator::State {
     DepthLattice lattice;
     double samplesPerVoxel = 1.0;  // never automaticRate
     std::shared_ptr<const TransferTable> table;
-    TransferFunction legend;  // the function, simplified
+    TransferFunction legend;            // the function, simplified
+    std::vector<ColorNode> colorNodes;  // of a volume with one value for colours
   };
 
   enum class For { Vdi, Picture };
@@ -148,9 +149,20 @@ struct VdiGenerator::State {
       validate(settings);
       if (result == For::Vdi) requireComposite(settings.blending);
       const Scene& scene = steps->scene();
-      if (!table || function != tableOf) {
-        auto made = std::make_shared<const TransferTable>(bake(function));
-        tableOf = TransferFunction(function);  // moved, so that no failure parts the two
+      if (steps->colors() > 0 && settings.blending.projects()) {
+        throw Error(ErrorCode::InvalidArgument,
+                    "maximum and minimum intensities need a single component, not components together");
+      }
+      // Beside colours of other values, the table has the opacities alone.
+      TransferFunction opacities;
+      if (steps->colors() > 0) {
+        opacities = function;
+        opacities.colors = {{0.0, glm::dvec3(1.0)}};
+      }
+      const TransferFunction& tabled = steps->colors() > 0 ? opacities : function;
+      if (!table || tabled != tableOf) {
+        auto made = std::make_shared<const TransferTable>(bake(tabled));
+        tableOf = TransferFunction(tabled);  // moved, so that no failure parts the two
         table = std::move(made);
       }
       GenerateSettings own = settings;
@@ -167,8 +179,10 @@ struct VdiGenerator::State {
       if (settings.blending.mode == BlendMode::Isosurface)
         own.samplesPerVoxel = rateOfSlabs(scene, camera, own);
       const View view = viewWithMargin(scene, camera, own);
-      prepared = std::make_unique<Prepared>(Prepared{view, depthLattice(scene, view, own.samplesPerVoxel),
-                                                     own.samplesPerVoxel, table, simplified(function)});
+      prepared = std::make_unique<Prepared>(
+          Prepared{view, depthLattice(scene, view, own.samplesPerVoxel), own.samplesPerVoxel, table,
+                   simplified(steps->colors() == 3 ? opacities : function),
+                   steps->colors() == 1 ? function.colors : std::vector<ColorNode>()});
       requireTractable(prepared->lattice, *device);
       steps->requireSpans(*prepared->table);
     });
@@ -180,8 +194,8 @@ struct VdiGenerator::State {
 
   detail::RayCaster::Inputs castInputsOf(const Prepared& prepared, const GenerateSettings& settings,
                                          const ListForm& form, bool runsOnly = false) const {
-    return {steps->scene(), prepared.view,   prepared.lattice, *prepared.table,
-            settings,       comm.size() > 1, runsOnly,         form};
+    return {steps->scene(), prepared.view, prepared.lattice,   *prepared.table, settings, comm.size() > 1,
+            runsOnly,       form,          prepared.colorNodes};
   }
 
   /// Runs the work of a frame. After an error, no work may continue in memory that the next frame takes, so
@@ -287,7 +301,7 @@ struct VdiGenerator::State {
     vdi.bounds = shown.empty() ? steps->scene().bounds : shown;
     vdi.sampleStep = prepared.lattice.step;
     Coloring& coloring = vdi.coloring.emplace();
-    coloring.range = steps->scalarRange();
+    coloring.range = steps->coloredRange();
     coloring.function = prepared.legend;
     if (hasDepthCode(settings.precision)) vdi.depthCode = depthCodeFor(prepared.lattice);
     const bool isPossible = !hasDepthCode(settings.precision) || vdi.depthCode.exists();
@@ -529,6 +543,10 @@ const Scene& VdiGenerator::scene() const {
 }
 const ScalarRange& VdiGenerator::scalarRange() const {
   return state_->steps->scalarRange();
+}
+
+const ScalarRange& VdiGenerator::coloredRange() const {
+  return state_->steps->coloredRange();
 }
 std::optional<ScalarRange> VdiGenerator::crowdedPart() const {
   return state_->steps->crowdedPart();

@@ -79,6 +79,9 @@ class VdiGenerator {
   /// The global range of finite values that blocks own. Ghost layers don't count, nor do values that finer
   /// blocks cover.
   const ScalarRange& scalarRange() const;
+  /// The global range of the values that transfer functions colour: scalarRange(), unless blocks have one
+  /// value for colours beside that for opacities (Block::colors).
+  const ScalarRange& coloredRange() const;
   /// The part of that range that nearly all values fill, if it is less than a 256th of it,
   /// so that colours over the whole range would tell few values apart. Equal on all ranks.
   std::optional<ScalarRange> crowdedPart() const;

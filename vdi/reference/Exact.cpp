@@ -66,17 +66,28 @@ double ExactVolume::at(const glm::dvec3& world) const {
   return alongY(low.z) * (1.0 - share.z) + alongY(high.z) * share.z;
 }
 
+namespace {
+
+glm::dvec3 colorAt(const ExactVolume& volume, const TransferFunction& function, const glm::dvec3& world) {
+  const auto& c = volume.colors;
+  if (c.size() == 3) return {c[0].at(world), c[1].at(world), c[2].at(world)};
+  return valueAt(function.colors, &ColorNode::color, c.empty() ? volume.at(world) : c[0].at(world));
+}
+
+}  // namespace
+
 glm::dvec4 integrate(const ExactVolume& volume, const TransferFunction& function, const glm::dvec3& from,
                      const glm::dvec3& to, int samples) {
   const double length = glm::length(to - from) / samples / function.unitDistance;
   glm::dvec3 light(0.0);
   double transmittance = 1.0;
   for (int i = 0; i < samples && transmittance > 1e-9; ++i) {
-    const double scalar = volume.at(from + (to - from) * ((i + 0.5) / samples));
+    const glm::dvec3 place = from + (to - from) * ((i + 0.5) / samples);
+    const double scalar = volume.at(place);
     if (std::isnan(scalar)) continue;  // transparent
     const double opacity = valueAt(function.opacities, &OpacityNode::opacity, scalar);
     const double passes = std::pow(1.0 - opacity, length);
-    light += transmittance * (1.0 - passes) * valueAt(function.colors, &ColorNode::color, scalar);
+    if (passes < 1.0) light += transmittance * (1.0 - passes) * colorAt(volume, function, place);
     transmittance *= passes;
   }
   return {light, 1.0 - transmittance};

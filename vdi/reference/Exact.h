@@ -22,6 +22,8 @@ struct ExactVolume {
   Box bounds;                  // the visible part: from point to point, or whole cells
   std::vector<double> values;  // [dims.z][dims.y][dims.x]
   bool nearest = false;
+  /// Volumes that give colours: none; one, which the function colours; or red, green and blue.
+  std::vector<ExactVolume> colors{};
 
   double at(const glm::dvec3& world) const;
 };

@@ -150,6 +150,7 @@ RayInputs::RayInputs(const Scene& theScene, const Camera& camera, const Transfer
       view(viewWithMargin(theScene, camera, theSettings)),
       lattice(depthLattice(theScene, view, theSettings.samplesPerVoxel)),
       table(bake(transferFunction)),
+      function(transferFunction),
       settings(theSettings),
       slabs(samplesAreSlabs(theScene, view, lattice)),
       reach(static_cast<float>(outermostReach(theScene, lattice))),
@@ -197,6 +198,20 @@ class SampledRay {
   /// The scalar at a place, as a position in the transfer table.
   double positionAt(float place, const Block& block) const {
     return inputs_.table.positionOf(interpolate(block, worldAt(place), inputs_.settings.interpolation));
+  }
+  /// The colour of a place where the block has values for it; else the given one.
+  glm::vec3 colorAt(float place, const Block& block, const glm::vec3& color) const {
+    if (block.colors.empty()) return color;
+    const auto valueOf = [&](const Block& values) {
+      return interpolate(values, worldAt(place), inputs_.settings.interpolation);
+    };
+    if (block.colors.size() == 1) return inputs_.function.colorAt(valueOf(block.colors[0]));
+    glm::dvec3 rgb;
+    for (int c = 0; c < 3; ++c) {
+      const Block& values = block.colors[static_cast<std::size_t>(c)];
+      rgb[c] = (valueOf(values) - values.displayed.x) / (values.displayed.y - values.displayed.x);
+    }
+    return glm::clamp(rgb, 0.0, 1.0);
   }
   glm::vec3 lightOn(float place, const Block& block) const {
     return lightAt(inputs_.settings, inputs_.view, block, worldAt(place), ray_.direction);
@@ -251,7 +266,7 @@ Material materialBetween(const RayInputs& inputs, const SampledRay& ray, const B
       ray.lengthPerDepth() / static_cast<float>(inputs.table.unitDistance) / inputs.slabTable.length;
   const Slab slab = inputs.slabTable.between(ray.positionAt(from, block), ray.positionAt(to, block));
   const float opticalDepth = std::min(slab.opticalDepth * slabsPerDepth * length, maxExtinction);
-  glm::vec3 color = slab.color * opacityOf(opticalDepth);
+  glm::vec3 color = ray.colorAt(middle, block, slab.color) * opacityOf(opticalDepth);
   if (inputs.settings.shading.on && opticalDepth > 0.0F) color *= ray.lightOn(middle, block);
   return {color, opticalDepth};
 }

@@ -29,6 +29,7 @@ struct RayInputs {
   View view;
   DepthLattice lattice;
   TransferTable table;
+  TransferFunction function;
   GenerateSettings settings;
   bool slabs = true;   // samplesAreSlabs
   float reach = 1.0F;  // outermostReach

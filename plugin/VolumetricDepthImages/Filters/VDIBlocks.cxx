@@ -91,14 +91,9 @@ Memory memoryOf(vtkDataArray* array, const glm::ivec3& counts) {
 }
 
 void requireComponent(vtkDataArray* array, int component) {
-  const int components = array->GetNumberOfComponents();
-  if (components == 1 || (component < components && component >= vdi::magnitude)) return;
-  if (component == vdi::phase && components == 2) return;
-  const std::string why =
-      component == vdi::phase
-          ? fmt::format("a phase needs two components, real and imaginary; the array has {}", components)
-          : fmt::format("component {} doesn't exist: the array has {}", component, components);
-  throw Error(ErrorCode::InvalidArgument, why, array->GetName());
+  const std::string issue = vdi::componentIssue(component, array->GetNumberOfComponents());
+  if (!issue.empty())
+    throw Error(ErrorCode::InvalidArgument, "the array " + issue, array->GetName() ? array->GetName() : "");
 }
 
 /// Throws if the array has fewer values than the lattice.

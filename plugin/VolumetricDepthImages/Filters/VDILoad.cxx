@@ -10,12 +10,20 @@
 #include <cstring>
 
 #include "VDIArrays.h"
+#include "vdi/core/ComponentValues.h"
 #include "vdi/core/Error.h"
 #include "vdi/core/Scene.h"
 
 namespace pv {
 
 namespace {
+
+template <std::size_t n>
+void allReduceMin(std::array<double, n>& values, vtkMultiProcessController* controller) {
+  if (controller == nullptr || controller->GetNumberOfProcesses() <= 1) return;
+  const auto mine = values;
+  controller->AllReduce(mine.data(), values.data(), static_cast<vtkIdType>(n), vtkCommunicator::MIN_OP);
+}
 
 /// The number of the smallest voxels that fill a unit of volume; 0 without blocks.
 double mostPerVolume(const std::vector<vdi::Block>& blocks) {
@@ -25,6 +33,34 @@ double mostPerVolume(const std::vector<vdi::Block>& blocks) {
     if (volume > 0.0) most = std::max(most, 1.0 / volume);
   }
   return most;
+}
+
+/// Collective: stretches four components together as Volume does.
+OpacityStretch stretchOf(std::vector<vdi::Block>& blocks, vtkMultiProcessController* controller) {
+  std::array<vdi::ScalarRange, 4> ranges;
+  double top = 0.0;
+  bool isExact = false;
+  for (const vdi::Block& block : blocks) {
+    if (block.colors.size() != 3) continue;  // the generator rejects it
+    const vdi::Block& red = block.colors.front();
+    top = red.displayed.y;
+    isExact = red.type != vdi::ScalarType::F32 && vdi::sizeOf(red.type) >= 4;
+    for (std::size_t c = 0; c < 3 && isExact; ++c) ranges[c].include(vdi::ownRange(block.withColors(c)));
+    ranges[3].include(vdi::ownRange(block));
+  }
+  std::array<double, 9> least{isExact ? 0.0 : -top};
+  for (std::size_t c = 0; c < 4; ++c) {
+    least[2 * c + 1] = ranges[c].min;
+    least[2 * c + 2] = -ranges[c].max;
+  }
+  allReduceMin(least, controller);
+  for (std::size_t c = 0; c < 3; ++c) {
+    const glm::dvec2 ends(least[2 * c + 1], -least[2 * c + 2]);
+    for (vdi::Block& block : blocks) {
+      if (isExact && ends.x < ends.y && c < block.colors.size()) block.colors[c].displayed = ends;
+    }
+  }
+  return {{least[7], -least[8]}, -least[0]};
 }
 
 }  // namespace
@@ -58,11 +94,7 @@ vdi::Box complete(Load& load, vtkDataObject* input, vtkMultiProcessController* c
                                -mostPerVolume(load.blocks),
                                lacksArray ? -1.0 : 0.0,
                                load.blocks.empty() ? 0.0 : -1.0};
-  if (controller != nullptr && controller->GetNumberOfProcesses() > 1) {
-    const auto mine = least;
-    controller->AllReduce(mine.data(), least.data(), static_cast<vtkIdType>(least.size()),
-                          vtkCommunicator::MIN_OP);
-  }
+  allReduceMin(least, controller);
   if (least[8] < 0.0 && least[9] == 0.0) {
     if (lacksArray) throw vdi::Error(vdi::ErrorCode::InvalidArgument, load.lack);
     throw vdi::Error(vdi::ErrorCode::RemoteRank, "other ranks' blocks lack the array");
@@ -71,7 +103,9 @@ vdi::Box complete(Load& load, vtkDataObject* input, vtkMultiProcessController* c
   load.array = {.name = load.of.choice.name,
                 .cells = load.of.choice.cells,
                 .components = count,
-                .component = count > 1 ? load.of.choice.component : 0};
+                .component = count > 1 ? vdi::legendComponent(load.of.choice.component, count) : 0};
+  if (load.of.choice.component == vdi::together && count == 4)
+    load.stretch = stretchOf(load.blocks, controller);
   load.voxelVolume = least[7] < 0.0 ? -1.0 / least[7] : 0.0;
   return {{least[0], least[1], least[2]}, {-least[3], -least[4], -least[5]}};
 }

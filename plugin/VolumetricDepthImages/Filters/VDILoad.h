@@ -13,6 +13,7 @@
 #include "vdi/core/Block.h"
 #include "vdi/core/Box.h"
 #include "vdi/core/Coloring.h"
+#include "vdi/core/ScalarRange.h"
 
 class vtkAlgorithm;
 class vtkDataObject;
@@ -31,6 +32,15 @@ struct Origin {
   bool operator==(const Origin&) const = default;
 };
 
+/// How Volume takes four components together (VTK's vtkVolumeTexture and vtkVolumeInputHelper): for types of
+/// up to 16 bits and f32, the opacity of a value is that of the opacity function at low + (high - low) *
+/// value / top, where low and high are the ends of the component's range. Other types' opacities are the
+/// function's, but the ends of their ranges are the darkest and brightest red, green and blue.
+struct OpacityStretch {
+  vdi::ScalarRange range;  // of the opacities' component on all ranks
+  double top = 0.0;        // 0: none
+};
+
 /// This rank's blocks of an origin, and the meaning of their values. The blocks share the values with the
 /// input.
 struct Load {
@@ -38,6 +48,7 @@ struct Load {
   std::vector<vdi::Block> blocks;
   vdi::ScalarArray array;    // the same on all ranks
   double voxelVolume = 0.0;  // volume of the smallest voxel on any rank; 0 without voxels
+  OpacityStretch stretch{};  // the same on all ranks
   std::string lack;          // the reason why none of this rank's blocks has the array
 };
 
@@ -46,8 +57,8 @@ void requireInput(vtkDataObject* input);
 /// Returns this rank's blocks. `upstream` makes the input. Throws vdi::Error for an input without such
 /// blocks.
 Load loadOf(vtkDataObject* input, vtkAlgorithm* upstream, const Origin& origin);
-/// Collective: fills in the load's array and voxel volume, and returns the bounds of all ranks' blocks.
-/// Throws vdi::Error on all ranks if there are blocks, but none with the array.
+/// Collective: fills in the load's array, voxel volume and stretch, and returns the bounds of all ranks'
+/// blocks. Throws vdi::Error on all ranks if there are blocks, but none with the array.
 vdi::Box complete(Load& load, vtkDataObject* input, vtkMultiProcessController* controller);
 
 }  // namespace pv

@@ -277,4 +277,14 @@ vdi::TransferFunction transferFunctionOf(vtkScalarsToColors* colors, vtkPiecewis
   return function;
 }
 
+std::vector<vdi::OpacityNode> stretched(const vdi::TransferFunction& function, double low, double high,
+                                        double top) {
+  std::vector<vdi::OpacityNode> nodes{{0.0, function.opacityAt(low)}};
+  for (const vdi::OpacityNode& node : function.opacities) {
+    if (node.x > low && node.x < high) nodes.push_back({(node.x - low) / (high - low) * top, node.opacity});
+  }
+  nodes.push_back({top, function.opacityAt(high)});
+  return nodes;
+}
+
 }  // namespace pv

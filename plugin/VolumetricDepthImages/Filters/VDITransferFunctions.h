@@ -2,6 +2,8 @@
 #ifndef VDITransferFunctions_h
 #define VDITransferFunctions_h
 
+#include <vector>
+
 #include "vdi/core/TransferFunction.h"
 
 class vtkPiecewiseFunction;
@@ -19,6 +21,10 @@ namespace pv {
 /// map's own if it has one, else a ramp from 0 to 1. `unitDistance` is in world units.
 vdi::TransferFunction transferFunctionOf(vtkScalarsToColors* colors, vtkPiecewiseFunction* opacity,
                                          double low, double high, double unitDistance);
+
+/// The function's opacities from `low` to `high`, moved and stretched to [0, top].
+std::vector<vdi::OpacityNode> stretched(const vdi::TransferFunction& function, double low, double high,
+                                        double top);
 
 }  // namespace pv
 

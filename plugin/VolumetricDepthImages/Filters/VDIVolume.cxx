@@ -145,6 +145,7 @@ void Volume::show(const Load& load) {
               .bounds = generator_->scene().bounds,
               .range = generator_->scalarRange(),
               .voxelVolume = load.voxelVolume,
+              .stretch = load.stretch,
               .array = load.array,
               .values = sampleOf(load.blocks, generator_->scalarRange(), comm)});
     const std::scoped_lock lock(mutex_);

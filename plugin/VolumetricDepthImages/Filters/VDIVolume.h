@@ -33,6 +33,7 @@ struct Shown {
   vdi::Box bounds;
   vdi::ScalarRange range;
   double voxelVolume = 0.0;
+  OpacityStretch stretch{};
   vdi::ScalarArray array;
   std::vector<double> values;  // a sample of the blocks' values, on the root
 };

@@ -235,7 +235,13 @@ void takeInterpolation(vtkSMProxy* filter, vtkSMProxy* shown) {
   vtkSMPropertyHelper(filter, "InterpolationType").Set(static_cast<int>(interpolation));
 }
 
-std::string displayIssues(vtkSMProxy* shown) {
+bool takesComponentsTogether(vtkSMProxy* shown) {
+  if (!isVolume(shown)) return false;
+  const bool maps = shown->GetProperty("MapScalars") == nullptr || isOn(shown, "MapScalars");
+  return !maps || isOn(shown, "MultiComponentsMapping");
+}
+
+std::string displayIssues(vtkSMProxy* shown, bool isTogether) {
   if (!isVolume(shown)) return {};
   std::string issues = blendModeIssue(shown);
   const auto add = [&issues](const char* issue) {
@@ -253,10 +259,10 @@ std::string displayIssues(vtkSMProxy* shown) {
     return std::any_of(names.begin(), names.end(),
                        [shown](const char* name) { return isChanged(shown, name); });
   };
-  if (isChanged(shown, "MapScalars") || isOn(shown, "MultiComponentsMapping")) {
-    add("The view takes this volume's colours from the components of its array (its Map Scalars, or its "
-        "Multi "
-        "Components Mapping). VolumetricDepthImage maps the one component that it shows.");
+  if (takesComponentsTogether(shown) && !isTogether) {
+    add("The view takes the components of this volume's array together (without its Map Scalars, or with its "
+        "Multi Components Mapping), for which an array needs two or four. VolumetricDepthImage maps the one "
+        "component that it shows.");
   }
   if (isAnyChanged({"VolumetricScatteringBlending", "VolumeAnisotropy", "GlobalIlluminationReach"})) {
     add("The view scatters light in this volume (its Volumetric Scattering, its Anisotropy or its Global "

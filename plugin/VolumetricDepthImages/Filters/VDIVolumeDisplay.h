@@ -38,10 +38,14 @@ void takeBlending(vtkSMProxy* filter, vtkSMProxy* shown);
 /// Sets InterpolationType of `filter` to that of the volume that `shown` shows.
 void takeInterpolation(vtkSMProxy* filter, vtkSMProxy* shown);
 
+/// Whether `shown` shows a volume whose components are colour and opacity together, without Map Scalars or
+/// with Multi Components Mapping.
+bool takesComponentsTogether(vtkSMProxy* shown);
+
 /// The message for a user whose view shows the volume by properties that the filter lacks: its blend mode,
 /// another array's opacity, a 2-D transfer function, another place. Empty if the filter shows what the view
-/// shows.
-std::string displayIssues(vtkSMProxy* shown);
+/// shows. `isTogether`: the filter takes components together.
+std::string displayIssues(vtkSMProxy* shown, bool isTogether);
 
 }  // namespace pv
 

@@ -282,8 +282,11 @@ void vtkSMVDIGeneratorProxy::TakeArrayFromView() {
   vtkSMPropertyHelper(this, "SelectInputScalars").SetInputArrayToProcess(association, name.c_str());
   // By default a map colours vectors by their magnitude.
   vtkSMProxy* map = vtkSMPropertyHelper(shown, "LookupTable", true).GetAsProxy();
-  if (map == nullptr || this->ComponentsOf(name, association) < 2) return;
-  vtkSMPropertyHelper(this, "Component").Set(pv::componentNamedBy(map));
+  const int components = this->ComponentsOf(name, association);
+  if (map == nullptr || components < 2) return;
+  const bool together =
+      pv::takesComponentsTogether(shown) && vdi::componentIssue(vdi::together, components).empty();
+  vtkSMPropertyHelper(this, "Component").Set(together ? vdi::together : pv::componentNamedBy(map));
 }
 
 int vtkSMVDIGeneratorProxy::ComponentsOf(const std::string& name, int association) {
@@ -312,13 +315,19 @@ void vtkSMVDIGeneratorProxy::TakeFromView() {
   // A script that sets both describes the whole VDI. Saved Python states set both, and leave out default
   // values.
   if (!hasCamera || !hasSize || this->HasViewpointOfView) {
-    this->TakeUnitDistance();
     pv::takeShading(this, shown, view);
     pv::takeCropping(this, shown,
                      this->OfRanks ? this->OfRanks->Whole : pv::wholeToCrop(this->InputInformation()));
     pv::takeBlending(this, shown);
     pv::takeInterpolation(this, shown);
-    if (const std::string issues = pv::displayIssues(shown); !issues.empty()) vtkWarningMacro(<< issues);
+    const Subject subject = this->CurrentSubject();
+    vtkSMPropertyHelper component(this, "Component");
+    if (component.GetAsInt() == vdi::magnitude && pv::takesComponentsTogether(shown) &&
+        vdi::componentIssue(vdi::together, this->ComponentsOf(subject.Array, subject.Association)).empty())
+      component.Set(vdi::together);
+    this->TakeUnitDistance();
+    const std::string issues = pv::displayIssues(shown, component.GetAsInt() == vdi::together);
+    if (!issues.empty()) vtkWarningMacro(<< issues);
   }
   if (!hasCamera && pv::isPlaced(view)) SetCamera(this, view);
   if (!hasSize) {
@@ -337,6 +346,10 @@ void vtkSMVDIGeneratorProxy::TakeUnitDistance() {
   double taken = 0.0;
   if (shown != nullptr && shown->GetProperty("ScalarOpacityUnitDistance") != nullptr)
     taken = vtkSMPropertyHelper(shown, "ScalarOpacityUnitDistance").GetAsDouble();
+  // VTK's mapper takes that of the last component (vtkVolumeInputHelper), which ParaView never sets.
+  if (taken != 0.0 && pv::takesComponentsTogether(shown) &&
+      vtkSMPropertyHelper(this, "Component").GetAsInt() == vdi::together)
+    taken = 1.0;
   unit.Set(taken);
   this->TakenUnitDistance = taken;
 }
@@ -513,7 +526,8 @@ bool vtkSMVDIGeneratorProxy::RangeOfScalars(const char* name, int association, s
         range[0] = -std::numbers::pi;
         range[1] = std::numbers::pi;
       } else {
-        const int component = components == 1 ? 0 : std::clamp(wanted, -1, components - 1);
+        const int named = vdi::legendComponent(wanted, components);
+        const int component = components == 1 ? 0 : std::clamp(named, -1, components - 1);
         array->GetComponentFiniteRange(component, range);
       }
     }

@@ -89,6 +89,7 @@ void vtkSMVDIGeneratorProxy::MapUpdated() {
 bool vtkSMVDIGeneratorProxy::TakeNamedComponent() {
   const Subject before = this->CurrentSubject();
   const int components = this->ComponentsOf(before.Array, before.Association);
+  if (before.Component == vdi::together) return false;  // no map names these
   if (components < 2 || this->NamedComponent >= components || this->NamedComponent == before.Component)
     return false;
   SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "the component that the map names");

@@ -478,12 +478,13 @@ pv::FrameInputs vtkVDIGenerator::AskedFrame() {
   // A thread must not make a communicator of several ranks.
   if (this->Internal->Use.volume()->hasRanks()) this->Internal->Use.volume()->make();
   this->Internal->Range.noteChoice(asked.load.of.choice);
-  return this->Announced(this->CurrentFrame(asked.bounds, asked.load.voxelVolume, {0.0, 1.0}));
+  return this->Announced(
+      this->CurrentFrame(asked.bounds, asked.load.voxelVolume, {0.0, 1.0}, asked.load.stretch));
 }
 
 pv::FrameInputs vtkVDIGenerator::ShownFrame(const pv::Shown& shown) {
-  return this->Announced(
-      this->CurrentFrame(shown.bounds, shown.voxelVolume, this->Internal->Range.rangeOf(shown)));
+  return this->Announced(this->CurrentFrame(shown.bounds, shown.voxelVolume,
+                                            this->Internal->Range.rangeOf(shown), shown.stretch));
 }
 
 /// Warns of what the frame's transfer function loses, once for each function.

@@ -6,8 +6,10 @@
 #include <vtkScalarsToColors.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "VDIFrameInputs.h"
+#include "VDILoad.h"
 #include "VDITransferFunctions.h"
 #include "vdi/core/Blending.h"
 #include "vdi/core/Box.h"
@@ -150,12 +152,16 @@ std::array<int, 2> vtkVDIProperties::PictureSize() const {
 }
 
 pv::FrameInputs vtkVDIProperties::CurrentFrame(const vdi::Box& bounds, double voxelVolume,
-                                               const vdi::ScalarRange& range) {
+                                               const vdi::ScalarRange& range,
+                                               const pv::OpacityStretch& stretch) {
   double unit = this->ScalarOpacityUnitDistance;
   if (unit <= 0.0) unit = vdi::unitDistanceOf(bounds, voxelVolume);
+  vdi::TransferFunction function =
+      pv::transferFunctionOf(this->LookupTable, this->ScalarOpacityFunction, range.min, range.max, unit);
+  if (stretch.top > 0.0 && stretch.range.min < stretch.range.max)
+    function.opacities = pv::stretched(function, stretch.range.min, stretch.range.max, stretch.top);
   return {.camera = this->Viewpoint(bounds),
-          .function = pv::transferFunctionOf(this->LookupTable, this->ScalarOpacityFunction, range.min,
-                                             range.max, unit),
+          .function = std::move(function),
           .settings = this->CurrentSettings()};
 }
 

@@ -26,6 +26,7 @@ struct ScalarRange;
 }  // namespace vdi
 namespace pv {
 struct FrameInputs;
+struct OpacityStretch;
 }  // namespace pv
 class vtkPiecewiseFunction;
 class vtkScalarsToColors;
@@ -147,7 +148,8 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIProperties : public vtkImageAlgorith
   vdi::GenerateSettings CurrentSettings() const;
   /// The frame for blocks in these bounds, with the current properties and maps. `range` is that of the
   /// default map.
-  pv::FrameInputs CurrentFrame(const vdi::Box& bounds, double voxelVolume, const vdi::ScalarRange& range);
+  pv::FrameInputs CurrentFrame(const vdi::Box& bounds, double voxelVolume, const vdi::ScalarRange& range,
+                               const pv::OpacityStretch& stretch);
 
   vtkSmartPointer<vtkScalarsToColors> LookupTable;
   vtkSmartPointer<vtkPiecewiseFunction> ScalarOpacityFunction;
