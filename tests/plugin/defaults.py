@@ -77,6 +77,20 @@ with Messages("WarningEvent") as texts:
     simple.RenderVDI(Input=made, UseOriginalCamera=1, Azimuth=20).UpdatePipeline()
 check(not texts, "a viewpoint near the VDI's own gets none")
 
+# Fill values that nobody has named stretch the map.
+filled = field([7, 0, -3])
+filled.GetPointData().GetArray("ball").SetName("filled")
+vtk_to_numpy(filled.GetPointData().GetArray("filled"))[::40] = 1e20
+for missing, count in (([], 1), ([1e20], 0)):
+    stretched = filter_of(producer_of(filled), name="filled", MissingValues=missing)
+    with Messages("WarningEvent") as texts:
+        for angle in (30, 20):
+            stretched.CameraViewAngle = angle
+            stretched.UpdatePipeline()
+    about = [text for text in texts if "'filled'" in text and "less than 1/256" in text]
+    check(len(about) == count, "a range of fill values, named %s, gets %d warnings: %s" % (missing, count, texts))
+    simple.Delete(stretched)
+
 # Arrays that don't exist, or exist only with the other association.
 for association, name, words in (
         ("CELLS", "ball",

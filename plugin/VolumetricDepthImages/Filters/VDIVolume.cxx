@@ -11,6 +11,7 @@
 #include "VDISession.h"
 #include "VDIValues.h"
 #include "vdi/core/Error.h"
+#include "vdi/core/SamplingRate.h"
 
 namespace pv {
 
@@ -140,14 +141,16 @@ void Volume::show(const Load& load) {
   try {
     generator_->setBlocks(load.blocks, load.of.fillGhosts);
     requireVolume(*generator_, load);
-    auto now = std::make_shared<const Shown>(
-        Shown{.of = load.of,
-              .bounds = generator_->scene().bounds,
-              .range = generator_->scalarRange(),
-              .voxelVolume = load.voxelVolume,
-              .stretch = load.stretch,
-              .array = load.array,
-              .values = sampleOf(load.blocks, generator_->scalarRange(), comm)});
+    const vdi::ScalarRange& range = generator_->scalarRange();
+    const std::optional<vdi::ScalarRange> part = generator_->crowdedPart();
+    auto now = std::make_shared<const Shown>(Shown{.of = load.of,
+                                                   .bounds = generator_->scene().bounds,
+                                                   .range = range,
+                                                   .crowded = part ? vdi::describeCrowded(range, *part) : "",
+                                                   .voxelVolume = load.voxelVolume,
+                                                   .stretch = load.stretch,
+                                                   .array = load.array,
+                                                   .values = sampleOf(load.blocks, range, comm)});
     const std::scoped_lock lock(mutex_);
     shown_ = std::move(now);
   } catch (...) {

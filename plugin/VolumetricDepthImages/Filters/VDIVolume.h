@@ -14,6 +14,7 @@
 #include <mutex>
 #include <optional>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "VDILoad.h"
@@ -32,6 +33,7 @@ struct Shown {
   Origin of;
   vdi::Box bounds;
   vdi::ScalarRange range;
+  std::string crowded;  // says that nearly all values fill a small part of the range; else empty
   double voxelVolume = 0.0;
   OpacityStretch stretch{};
   vdi::ScalarArray array;

@@ -21,6 +21,7 @@
 #include <functional>
 #include <new>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -60,6 +61,7 @@ struct vtkVDIGenerator::Internals {
   pv::Failure Said;
   pv::DefaultRange Range;
   std::pair<vdi::TransferFunction, std::string> Loss;  // the last frame's function, and what it loses
+  std::set<std::string> Crowded;                       // arrays whose range was said to be too wide
   pv::Regeneration Regeneration;                       // last member, because its thread uses the others
 };
 
@@ -192,6 +194,7 @@ int vtkVDIGenerator::RequestData(vtkInformation*, vtkInformationVector** inputs,
   }
   if (failure) return this->EndWithout(failure, output);
   this->Internal->Said.isOver();
+  this->SayCrowded(origin);
   if (const auto made = pv::madeVdiOf(output, this->CurrentSettings(), this->Internal->Reports.ranks))
     this->Internal->Last = pv::numbersOf(*made);
   regeneration.finish(output, origin, this->CurrentMTime());  // the time has grown: a map has built its table
@@ -496,6 +499,18 @@ pv::FrameInputs vtkVDIGenerator::Announced(pv::FrameInputs frame) {
   if (this->IsRoot() && !now.empty() && now != loss) vtkWarningMacro(<< now);
   loss = now;
   return frame;
+}
+
+/// Warns, once for each array, that the map spans all of a range of which nearly all values fill a small
+/// part.
+void vtkVDIGenerator::SayCrowded(const pv::Origin& origin) {
+  const std::shared_ptr<const pv::Shown> shown = this->Internal->Use.shownOf(origin);
+  if (!this->IsRoot() || !shown || shown->crowded.empty()) return;
+  const std::vector<vdi::ColorNode> colors = this->ShownFrame(*shown).function.colors;
+  const bool isWhole = colors.front().x == shown->range.min && colors.back().x == shown->range.max;
+  const std::string& array = shown->array.name;
+  if (isWhole && this->Internal->Crowded.insert(array).second)
+    vtkWarningMacro(<< "'" << array << "': " << shown->crowded << " (Missing Values)");
 }
 
 /// Ends the use of the volume by this filter's thread. Returns whether the thread has made exactly this

@@ -119,6 +119,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkVDIGenerator : public vtkVDIProperties 
   pv::FrameInputs AskedFrame();
   pv::FrameInputs ShownFrame(const pv::Shown& shown);
   pv::FrameInputs Announced(pv::FrameInputs frame);
+  void SayCrowded(const pv::Origin& origin);
   pv::Origin OriginOf(vtkDataObject* input);
   bool TakePreparation(const pv::Origin& origin, vtkImageData* output);
   int GiveMade(const pv::Origin& origin, vtkImageData* output);
