@@ -204,6 +204,7 @@ class LayerSources {
     const ByteStrides strides = block.strides.value_or(ByteStrides(0));
     return {
         block.data,
+        block.computed.get(),
         {strides.x, strides.y, strides.z},
         {block.dims.x, block.dims.y, block.dims.z},
         {block.origin.x, block.origin.y, block.origin.z, block.spacing.x, block.spacing.y, block.spacing.z}};
