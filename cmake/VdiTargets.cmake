@@ -50,12 +50,12 @@ function(vdi_time_limit variable seconds)
   set(${variable} "${seconds}" PARENT_SCOPE)
 endfunction()
 
-# vdi_add_catch_test(core SOURCES ... LINK ... [RANKS 3] [LONG_RANKS 5] [TIMEOUT
+# vdi_add_catch_test(core SOURCES ... LINK ... [RANKS 3] [LONG_RANKS 5] [TAGS long] [TIMEOUT
 # seconds] [LABELS ...]): defines the program test_<name> with tests/Main.cpp (or tests/MpiMain.cpp
-# if RANKS is given), and a ctest for each of its cases or rank counts; see
+# if RANKS is given), and a ctest for each of its cases, tags or rank counts; see
 # cmake/DiscoverTests.cmake. Each test has a time limit.
 function(vdi_add_catch_test name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LINK;RANKS;LONG_RANKS;LABELS;ENVIRONMENT")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "TIMEOUT" "SOURCES;LINK;RANKS;LONG_RANKS;TAGS;LABELS;ENVIRONMENT")
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
@@ -77,7 +77,7 @@ function(vdi_add_catch_test name)
     POST_BUILD
     COMMAND
       ${CMAKE_COMMAND} -D "NAME=${name}" -D "PROGRAM=$<TARGET_FILE:test_${name}>" -D "RANKS=${arg_RANKS}" -D
-      "LONG_RANKS=${arg_LONG_RANKS}" -D
+      "LONG_RANKS=${arg_LONG_RANKS}" -D "TAGS=${arg_TAGS}" -D
       "LAUNCHER=${MPIEXEC_EXECUTABLE};--oversubscribe;${MPIEXEC_NUMPROC_FLAG}" -D "TIMEOUT=${arg_TIMEOUT}" -D
       "LABELS=${arg_LABELS}" -D "ENVIRONMENT=${VDI_TEST_ENVIRONMENT};${arg_ENVIRONMENT}" -D "LIST_OPTIONS=${VDI_CATCH_LIST}" -D
       "NO_TESTS=${VDI_CATCH_NO_TESTS}" -D "OUTPUT=${tests}" -P

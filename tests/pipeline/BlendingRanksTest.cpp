@@ -1,6 +1,4 @@
 // Blend modes other than composite: the picture of several ranks is that of one.
-#include <memory>
-
 #include "tests/Catch.h"
 #include "tests/Devices.h"
 #include "tests/OpticalScenes.h"
@@ -12,9 +10,8 @@ using synthetic::Layout;
 
 TEST_CASE("blending: several ranks with scattered blocks") {
   const comm::Communicator world = comm::Communicator::world();
-  const std::shared_ptr<gpu::Device> device = gpu::Device::create(gpu::requestFromEnvironment(0));
-  VdiGenerator generator(device, comm::Communicator::world());
-  VdiGenerator alone(device, comm::Communicator::serial());
+  VdiGenerator generator(test::device(), comm::Communicator::world());
+  VdiGenerator alone(test::device(), comm::Communicator::serial());
   TransferFunction function = test::threeHues(1.0);
   function.opacities = {{0.0, 0.8}, {0.5, 0.2}, {1.0, 0.9}};
   for (const Layout layout : {Layout::Random, Layout::Interleaved}) {
@@ -45,7 +42,7 @@ TEST_CASE("blending: several ranks with scattered blocks") {
 
 TEST_CASE("blending: ranks that have nothing, and a mode that differs") {
   const comm::Communicator world = comm::Communicator::world();
-  VdiGenerator generator(gpu::Device::create(gpu::requestFromEnvironment(0)), comm::Communicator::world());
+  VdiGenerator generator(test::device(), comm::Communicator::world());
   const auto whole = test::dealt(world, "turbulence", {12, 12, 12}, {1, 1, 1}, Layout::OnOneRank);
   generator.setBlocks(whole.mine);
   GenerateSettings settings = test::smallSettings(20, 16);

@@ -77,13 +77,13 @@ void checkAgainstReference(VdiGenerator& generator, const Case& c) {
 
 }  // namespace
 
-TEST_CASE("blending: extremes and isosurfaces of the device are the reference's") {
-  for (const auto& device : {test::device(), test::deviceAsGpu()}) {
-    VdiGenerator generator(device, comm::Communicator::serial());
-    checkAgainstReference(generator, {ScalarType::F32, Joint::SharedPoints, false, false});
-    checkAgainstReference(generator, {ScalarType::U8, Joint::Cells, false, true});
-    checkAgainstReference(generator, {ScalarType::F64, Joint::SharedPoints, true, true});
-  }
+TEST_CASE("blending: extremes and isosurfaces of the device are the reference's", "[pictures]") {
+  // Nearly all of the time goes into compiling a program for each of these.
+  VdiGenerator onCpu(test::device(), comm::Communicator::serial());
+  checkAgainstReference(onCpu, {ScalarType::F32, Joint::SharedPoints, false, false});
+  checkAgainstReference(onCpu, {ScalarType::F64, Joint::SharedPoints, true, true});
+  VdiGenerator asGpu(test::deviceAsGpu(), comm::Communicator::serial());
+  checkAgainstReference(asGpu, {ScalarType::U8, Joint::Cells, false, true});
 }
 
 TEST_CASE("blending: the oracle's extremes and crossings, worked out by hand") {

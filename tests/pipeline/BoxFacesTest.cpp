@@ -54,7 +54,8 @@ double errorOf(const Image& seen, const Image& truth) {
 
 }  // namespace
 
-TEST_CASE("box faces: views along them are the reference's, and nearer to the volume than without") {
+TEST_CASE("box faces: views along them are the reference's, and nearer to the volume than without",
+          "[pictures]") {
   const auto decomposed = test::onOneRank("turbulence", {24, 24, 24});
   VdiGenerator generator(test::device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);

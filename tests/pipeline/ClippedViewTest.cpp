@@ -36,7 +36,7 @@ std::size_t pixelsOffBy(const Image& a, const Image& b, float tolerance) {
 
 }  // namespace
 
-TEST_CASE("clipped views: those of the reference, from anywhere") {
+TEST_CASE("clipped views: those of the reference, from anywhere", "[pictures]") {
   const std::vector<ClipPlane> planes{{{0.5, 0.5, 0.6}, {0.2, -0.3, -1.0}},
                                       {{0.3, 0.0, 0.0}, {2.0, 0.5, 0.0}}};
   for (const auto& device : {test::device(), test::device(true)}) {

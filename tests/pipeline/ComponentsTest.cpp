@@ -90,7 +90,7 @@ TransferFunction functionUpTo(double top) {
 
 }  // namespace
 
-TEST_CASE("components: the optical model's integral of the data's colours and opacities") {
+TEST_CASE("components: the optical model's integral of the data's colours and opacities", "[pictures]") {
   struct Case {
     ScalarType type;
     int components;

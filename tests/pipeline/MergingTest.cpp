@@ -28,7 +28,7 @@ using test::listsThatDiffer;
 using test::oneCode;
 using test::withLayers;
 
-TEST_CASE("merging and compositing on the device equal the reference") {
+TEST_CASE("merging and compositing on the device equal the reference", "[pictures]") {
   const auto decomposed = test::decompose("turbulence", {26, 22, 24}, {3, 3, 3}, Layout::Random,
                                           Joint::SharedPoints, ScalarType::F32, 0, 1);
   const TransferFunction function = test::threeHues(0.8);
@@ -90,7 +90,7 @@ TEST_CASE("merging and compositing on the device equal the reference") {
   CHECK(device()->validationMessages() == "");
 }
 
-TEST_CASE("ranks that agree on one tolerance: each one's lists are those of the reference") {
+TEST_CASE("ranks that agree on one tolerance: each one's lists are those of the reference", "[pictures]") {
   // Many small blocks assigned at random: lists with many runs, some with more than the counted lists around
   // them.
   const auto blocks = GENERATE(glm::ivec3(3, 3, 3), glm::ivec3(9, 8, 9));
@@ -157,7 +157,7 @@ TEST_CASE("ranks that agree on one tolerance: each one's lists are those of the 
   CHECK(own->validationMessages() == "");
 }
 
-TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists") {
+TEST_CASE("a total budget: as in the reference, the wanted total, unequal lists", "[pictures]") {
   const double fill = GENERATE(1.0, 0.5);
   INFO("fill " << fill);
   const auto decomposed = test::decompose("turbulence", {40, 40, 40}, {2, 2, 2}, Layout::Random,

@@ -69,7 +69,7 @@ GenerateSettings nearestSettings(int width, int height, double rate) {
 
 }  // namespace
 
-TEST_CASE("nearest: the optical model's integral at any rate, and no label that no voxel has") {
+TEST_CASE("nearest: the optical model's integral at any rate, and no label that no voxel has", "[pictures]") {
   const TransferFunction function = functionOfLabels();
   VdiGenerator generator(test::device(), comm::Communicator::serial());
   struct Case {
@@ -106,7 +106,7 @@ TEST_CASE("nearest: the optical model's integral at any rate, and no label that 
   }
 }
 
-TEST_CASE("nearest: DVR and lists of the device are the reference's, shaded too") {
+TEST_CASE("nearest: DVR and lists of the device are the reference's, shaded too", "[pictures]") {
   const TransferFunction function = functionOfLabels();
   for (const bool shade : {false, true}) {
     VdiGenerator generator(shade ? test::device() : test::deviceAsGpu(), comm::Communicator::serial());

@@ -18,8 +18,7 @@ TEST_CASE("optical model: several ranks") {
     bool parallel;
   };
   const comm::Communicator world = comm::Communicator::world();
-  const std::shared_ptr<gpu::Device> device = gpu::Device::create(gpu::requestFromEnvironment(0));
-  VdiGenerator generator(device, comm::Communicator::world());
+  VdiGenerator generator(test::device(), comm::Communicator::world());
   for (const Case& c : {Case{0, Joint::Cells, Layout::Random, false},
                         Case{6, Joint::SharedPoints, Layout::Interleaved, true}}) {
     const test::Stretch& stretch = test::stretches[c.stretch];
@@ -29,7 +28,7 @@ TEST_CASE("optical model: several ranks") {
     const Camera camera = test::lookingAt(c.parallel);
     // Pictures of one rank are compared for all functions.
     const std::vector<test::NamedFunction> functions = test::namedFunctions(stretch);
-    for (std::size_t i = c.parallel ? 1 : 0; i < functions.size(); i += 3) {
+    for (std::size_t i = c.parallel ? 1 : 0; i < functions.size(); i += 6) {
       const test::NamedFunction& named = functions[i];
       Image expected;
       for (const double rate : {automaticRate, 8.0}) {
@@ -38,7 +37,7 @@ TEST_CASE("optical model: several ranks") {
         if (world.rank() == 0 && expected.rgba.empty())
           expected =
               reference::renderExactly(scene.whole, named.function, camera, settings.width, settings.height);
-        const test::Bound bound = test::boundOf(*device, rate, named.steep);
+        const test::Bound bound = test::boundOf(*test::device(), rate, named.steep);
         const auto volume = generator.renderVolume(camera, named.function, settings);
         const auto vdi = generator.generate(camera, named.function, settings);
         if (world.rank() != 0) continue;

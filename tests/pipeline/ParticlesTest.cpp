@@ -324,7 +324,7 @@ TEST_CASE("blocks of one spacing that overlap are an error on all ranks") {
   CHECK_THROWS_WITH(depositor.setBlocks(blocks), test::ContainsSubstring("overlap"));
 }
 
-TEST_CASE("millions of particles in one cell, and particles per second") {
+TEST_CASE("millions of particles in one cell, and particles per second", "[long]") {
   const comm::Communicator world = comm::Communicator::world();
   constexpr std::size_t count = 2'000'000;
   const Box cell{glm::dvec3(0.50), glm::dvec3(0.51)};  // in a corner where eight blocks meet

@@ -31,7 +31,7 @@ using test::oneCode;
 using test::rounding;
 using test::withLayers;
 
-TEST_CASE("DVR, generation and rendering on the device equal the reference") {
+TEST_CASE("DVR, generation and rendering on the device equal the reference", "[pictures]") {
   for (const bool parallel : {false, true}) {
     for (const ScalarType type : {ScalarType::U8, ScalarType::I8, ScalarType::U16, ScalarType::I16,
                                   ScalarType::U32, ScalarType::I32, ScalarType::F32, ScalarType::F64}) {
@@ -97,7 +97,8 @@ TEST_CASE("DVR, generation and rendering on the device equal the reference") {
   CHECK(device()->validationMessages() == "");
 }
 
-TEST_CASE("a margin: the reference's lists around the picture, and no cut edge when the view turns") {
+TEST_CASE("a margin: the reference's lists around the picture, and no cut edge when the view turns",
+          "[pictures]") {
   for (const bool parallel : {false, true}) {
     INFO((parallel ? "parallel" : "perspective"));
     const auto decomposed = test::onOneRank("turbulence", {26, 22, 24}, {2, 2, 2});
@@ -144,7 +145,8 @@ TEST_CASE("a margin: the reference's lists around the picture, and no cut edge w
   }
 }
 
-TEST_CASE("macrocells that rays pass and samples that are counted as one: as in the reference") {
+TEST_CASE("macrocells that rays pass and samples that are counted as one: as in the reference",
+          "[pictures]") {
   // Each axis has several macrocells, most of them empty.
   const auto decomposed = test::onOneRank("coil", {70, 75, 66}, {1, 2, 1}, ScalarType::U8);
   VdiGenerator generator(device(), comm::Communicator::serial());
@@ -198,7 +200,7 @@ TEST_CASE("rays continue behind material of opacity 1, unless they must end") {
   CHECK(counts[1] > 2 * counts[0]);
 }
 
-TEST_CASE("programs for GPUs give the same lists as those for CPUs") {
+TEST_CASE("programs for GPUs give the same lists as those for CPUs", "[pictures]") {
   const Budget budget = GENERATE(Budget::List, Budget::Total);
   const std::uint32_t supersegments = GENERATE(1U, 6U, 255U);
   INFO(supersegments << " supersegments, budget " << toString(budget));

@@ -2,7 +2,7 @@
 // with an integral that shares nothing with them.
 #include <algorithm>
 #include <cmath>
-#include <memory>
+#include <utility>
 #include <vector>
 
 #include "tests/Catch.h"
@@ -31,30 +31,28 @@ Region boxAndPlanes() {
 
 }  // namespace
 
-TEST_CASE("region: DVR and lists of the device are the reference's") {
-  const std::vector<std::shared_ptr<gpu::Device>> devices{test::device(), test::device(true)};
-  for (const auto& device : devices) {
+TEST_CASE("region: DVR and lists of the device are the reference's", "[pictures]") {
+  for (const auto& [device, parallel] : {std::pair(test::device(), false), std::pair(test::device(), true),
+                                         std::pair(test::device(true), true)}) {
     VdiGenerator generator(device, comm::Communicator::serial());
-    for (const bool parallel : {false, true}) {
-      const auto decomposed = test::onOneRank("turbulence", {26, 22, 24}, {2, 2, 2});
-      const TransferFunction function = test::threeHues(0.8);
-      GenerateSettings settings = test::smallSettings(31, 23, 8);
-      settings.precision = Precision::Full;
-      settings.region = boxAndPlanes();
-      settings.shading.on = parallel;
-      settings.samplesPerVoxel = parallel ? 0.4 : 1.0;
-      const Camera camera = test::oblique(parallel);
-      generator.setBlocks(decomposed.mine);
-      const reference::RayInputs inputs(generator.scene(), camera, function, settings);
-      const Image expected = reference::renderVolume(
-          inputs, comm::exchangeGhosts(comm::Communicator::serial(), decomposed.mine));
-      const auto image = generator.renderVolume(camera, function, settings);
-      CHECK(test::largestDifference(*image, expected) < (device->isCpu() ? 0.5F : 1.5F));  // coarse filters
-      const auto vdi = generator.generate(camera, function, settings);
-      CHECK_NOTHROW(validate(*vdi));
-      CHECK(test::largestDifference(flatten(*vdi), expected) < 1.5F);
-      CHECK(vdi->bounds == generator.scene().bounds.intersection(*settings.region.box));
-    }
+    const auto decomposed = test::onOneRank("turbulence", {26, 22, 24}, {2, 2, 2});
+    const TransferFunction function = test::threeHues(0.8);
+    GenerateSettings settings = test::smallSettings(31, 23, 8);
+    settings.precision = Precision::Full;
+    settings.region = boxAndPlanes();
+    settings.shading.on = parallel;
+    settings.samplesPerVoxel = parallel ? 0.4 : 1.0;
+    const Camera camera = test::oblique(parallel);
+    generator.setBlocks(decomposed.mine);
+    const reference::RayInputs inputs(generator.scene(), camera, function, settings);
+    const Image expected =
+        reference::renderVolume(inputs, comm::exchangeGhosts(comm::Communicator::serial(), decomposed.mine));
+    const auto image = generator.renderVolume(camera, function, settings);
+    CHECK(test::largestDifference(*image, expected) < (device->isCpu() ? 0.5F : 1.5F));  // coarse filters
+    const auto vdi = generator.generate(camera, function, settings);
+    CHECK_NOTHROW(validate(*vdi));
+    CHECK(test::largestDifference(flatten(*vdi), expected) < 1.5F);
+    CHECK(vdi->bounds == generator.scene().bounds.intersection(*settings.region.box));
   }
 }
 
@@ -102,7 +100,7 @@ TEST_CASE("region: a box on the lattice shows the volume of the values in it") {
   }
 }
 
-TEST_CASE("region: the blocks don't show, however far the outermost samples reach") {
+TEST_CASE("region: the blocks don't show, however far the outermost samples reach", "[pictures]") {
   // The region ends shortly behind a face between blocks, where a ray's last sample reaches farther than the
   // block in front has values.
   const glm::ivec3 size{17, 17, 17};
@@ -135,7 +133,7 @@ TEST_CASE("region: the blocks don't show, however far the outermost samples reac
   }
 }
 
-TEST_CASE("region: the optical model's integral, with light at the cut") {
+TEST_CASE("region: the optical model's integral, with light at the cut", "[pictures]") {
   const glm::ivec3 size{22, 24, 16};
   const glm::dvec3 spacing{1.0, 0.8, 1.5};
   const test::Lattice lattice(size, spacing, [&](const glm::dvec3& p) {

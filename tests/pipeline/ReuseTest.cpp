@@ -62,7 +62,7 @@ TEST_CASE("a picture in the memory of another one is the same") {
   }
 }
 
-TEST_CASE("VDIs set before the last one's upload has ended are rendered whole") {
+TEST_CASE("VDIs set before the last one's upload has ended are rendered whole", "[threads]") {
   VdiGenerator generator(device(), comm::Communicator::serial());
   const Camera camera = test::oblique();
   std::vector<Vdi> vdis;
@@ -87,7 +87,7 @@ TEST_CASE("VDIs set before the last one's upload has ended are rendered whole") 
   CHECK(device()->validationMessages() == "");
 }
 
-TEST_CASE("frames of the same size reuse everything") {
+TEST_CASE("frames of the same size reuse everything", "[threads]") {
   const auto decomposed = test::onOneRank("shells", {20, 20, 20}, {2, 2, 2});
   const GenerateSettings settings = test::smallSettings();
   VdiGenerator generator(device(), comm::Communicator::serial());

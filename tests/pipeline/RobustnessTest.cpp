@@ -57,7 +57,8 @@ TEST_CASE("a box filled with one value: its picture doesn't depend on where samp
   CHECK(worst < 1.0F / 255.0F);
 }
 
-TEST_CASE("NaN is transparent, infinite scalars are beyond the transfer function's ends, the rest is shown") {
+TEST_CASE("NaN is transparent, infinite scalars are beyond the transfer function's ends, the rest is shown",
+          "[pictures]") {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
   VdiGenerator generator(device(), comm::Communicator::serial());
@@ -166,7 +167,7 @@ TEST_CASE("no blocks, empty blocks, a transparent function, one supersegment, co
   CHECK(highestOpacity(flatten(*single)) > 0.5F);
 }
 
-TEST_CASE("scales of 1e-9, 1e9 and 1e21 give the picture of scale 1") {
+TEST_CASE("scales of 1e-9, 1e9 and 1e21 give the picture of scale 1", "[pictures]") {
   const auto value = [](const glm::ivec3& i) {
     return static_cast<float>((i.x * 7 + i.y * 3 + i.z * 5) % 11) / 11.0F;
   };
@@ -250,7 +251,8 @@ TransferFunction band(double center, double halfWidth) {
 
 }  // namespace
 
-TEST_CASE("many bands, one narrow band, constant data, one opaque voxel: V_O's picture is the volume's") {
+TEST_CASE("many bands, one narrow band, constant data, one opaque voxel: V_O's picture is the volume's",
+          "[pictures]") {
   VdiGenerator generator(device(), comm::Communicator::serial());
   const GenerateSettings settings = test::smallSettings(64, 48, 6);
   generator.setBlocks({cube(
@@ -277,7 +279,7 @@ TEST_CASE("many bands, one narrow band, constant data, one opaque voxel: V_O's p
   requireFaithful(generator, test::oblique(), band(1.0, 0.8), fine);
 }
 
-TEST_CASE("voxels 50 times as long as wide") {
+TEST_CASE("voxels 50 times as long as wide", "[pictures]") {
   const synthetic::Lattice lattice{
       {40, 40, 5}, glm::dvec3(0.0), {0.01, 0.01, 0.5}, ScalarType::F32, Joint::SharedPoints};
   const Block block = synthetic::makeBlock(lattice, {{0, 0, 0}, {40, 40, 5}, 0}, [](const glm::ivec3& i) {
@@ -290,7 +292,7 @@ TEST_CASE("voxels 50 times as long as wide") {
   requireFaithful(generator, camera, test::threeHues(1.0), test::smallSettings(64, 48, 10));
 }
 
-TEST_CASE("one supersegment a list and 255, pictures of one pixel and of one row") {
+TEST_CASE("one supersegment a list and 255, pictures of one pixel and of one row", "[pictures]") {
   const auto decomposed = test::onOneRank("turbulence", {30, 30, 30}, {2, 2, 2}, ScalarType::U8);
   VdiGenerator generator(device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
@@ -325,7 +327,7 @@ TEST_CASE("rays of more samples than depth codes can tell apart give a VDI of fu
   CHECK_NOTHROW(validate(*vdi));
 }
 
-TEST_CASE("values beyond single precision: a right picture or an error") {
+TEST_CASE("values beyond single precision: a right picture or an error", "[pictures]") {
   VdiGenerator generator(device(), comm::Communicator::serial());
   const auto blockOf = [](ScalarType type, double scale, double spacing = 1.0, double origin = 0.0) {
     const synthetic::Lattice lattice{glm::ivec3(8), glm::dvec3(origin), glm::dvec3(spacing), type,

@@ -38,7 +38,8 @@ ImageDifference differenceOf(const Image& a, const Image& b) {
 
 }  // namespace
 
-TEST_CASE("a VDI that is shown from the device's lists is the one that goes by way of the host") {
+TEST_CASE("a VDI that is shown from the device's lists is the one that goes by way of the host",
+          "[pictures]") {
   const auto decomposed = test::onOneRank("turbulence", {40, 36, 32}, {2, 2, 2});
   const auto other = gpu::Device::create(gpu::requestFromEnvironment(0));
   VdiRenderer renderer(device());
@@ -112,7 +113,7 @@ TEST_CASE("a VDI that is prepared during renders changes none of them until it i
   CHECK(device()->validationMessages() == "");
 }
 
-TEST_CASE("few lists show about the same from everywhere") {
+TEST_CASE("few lists show about the same from everywhere", "[pictures]") {
   Camera camera = test::oblique();
   camera.parallelProjection = GENERATE(false, true);
   camera.parallelScale = 0.8;

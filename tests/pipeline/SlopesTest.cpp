@@ -13,7 +13,7 @@
 using namespace vdi;
 using reference::Slopes;
 
-TEST_CASE("slopes of faces: the device's are the reference's") {
+TEST_CASE("slopes of faces: the device's are the reference's", "[pictures]") {
   const bool parallel = GENERATE(false, true);
   const auto decomposed = test::onOneRank("shells", {30, 26, 28});
   VdiGenerator generator(test::device(), comm::Communicator::serial());

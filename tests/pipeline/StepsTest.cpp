@@ -58,7 +58,8 @@ Block withoutData() {
 
 }  // namespace
 
-TEST_CASE("the next step's blocks don't change what's shown until advance, and then they're all that is") {
+TEST_CASE("the next step's blocks don't change what's shown until advance, and then they're all that is",
+          "[threads]") {
   const std::array steps{
       timeStep("turbulence", {26, 22, 24}, ScalarType::F32),
       timeStep("shells", {26, 22, 24}, ScalarType::F32),
@@ -204,7 +205,7 @@ void checkOwnRange(VdiGenerator& generator, const Halos& halos) {
 
 }  // namespace
 
-TEST_CASE("the range is that of the values that blocks own, whatever ghost layers hold") {
+TEST_CASE("the range is that of the values that blocks own, whatever ghost layers hold", "[pictures]") {
   // A generator opens a device's programs, which takes longer than the range does.
   VdiGenerator generator(device(), comm::Communicator::serial());
   for (const auto type :
@@ -244,7 +245,7 @@ TEST_CASE("values that a finer block covers don't count for the range") {
   CHECK(generator.scalarRange() == ScalarRange{ownValue(glm::ivec3(0)), ownValue(size - 1)});
 }
 
-TEST_CASE("steps that are never shown, and invalid ones, leave the shown one intact") {
+TEST_CASE("steps that are never shown, and invalid ones, leave the shown one intact", "[threads]") {
   const TimeStep first = timeStep("turbulence", {26, 22, 24}, ScalarType::F32);
   const TimeStep second = timeStep("shells", {26, 22, 24}, ScalarType::F32);
   VdiGenerator alone(device(), comm::Communicator::serial());

@@ -89,7 +89,7 @@ class OneCore {
 
 }  // namespace
 
-TEST_CASE("a VDI is the same in any layout of its blocks' values") {
+TEST_CASE("a VDI is the same in any layout of its blocks' values", "[pictures]") {
   const auto type = GENERATE(ScalarType::U8, ScalarType::I16, ScalarType::F32, ScalarType::F64);
   const std::vector<Block> packed = decomposed({27, 22, 24}, {2, 1, 2}, Joint::Cells, type);
   const CompactLists expected = listsOf(packed, type);
@@ -114,7 +114,7 @@ TEST_CASE("a shader makes the texels that the host makes of values of any type")
   CHECK(test::device(true)->validationMessages() == "");
 }
 
-TEST_CASE("a device that reads rows and slices from the host's memory finds them") {
+TEST_CASE("a device that reads rows and slices from the host's memory finds them", "[pictures]") {
   const OneCore one;  // with more cores, the host copies the values
   const auto type = GENERATE(ScalarType::U8, ScalarType::U16, ScalarType::F32);
   const std::vector<Block> packed = decomposed({104, 106, 108}, glm::ivec3(1), Joint::SharedPoints, type);

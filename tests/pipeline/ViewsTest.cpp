@@ -40,7 +40,7 @@ struct BothRenderers {
 
 }  // namespace
 
-TEST_CASE("rays leave a picture within a tile of lists, through material at its edge") {
+TEST_CASE("rays leave a picture within a tile of lists, through material at its edge", "[pictures]") {
   const auto decomposed = test::onOneRank("interface", {24, 24, 24});
   VdiGenerator generator(device(), comm::Communicator::serial());
   generator.setBlocks(decomposed.mine);
@@ -95,7 +95,7 @@ TEST_CASE("bytes of a view are those of its floats, whichever was asked for befo
   CHECK(device()->validationMessages() == "");
 }
 
-TEST_CASE("views of a sparse VDI, most of whose tiles are skipped: as in the reference") {
+TEST_CASE("views of a sparse VDI, most of whose tiles are skipped: as in the reference", "[pictures]") {
   const bool parallel = GENERATE(false, true);
   const Camera camera = test::oblique(parallel);
   const Vdi vdi = coilFrom(camera);
@@ -141,7 +141,7 @@ TEST_CASE("views of a sparse VDI, most of whose tiles are skipped: as in the ref
   CHECK(deviceAsGpu()->validationMessages() == "");
 }
 
-TEST_CASE("rays that end at objects, of any part of an image plane: as in the reference") {
+TEST_CASE("rays that end at objects, of any part of an image plane: as in the reference", "[pictures]") {
   const bool parallel = GENERATE(false, true);
   const Camera camera = test::oblique(parallel);
   const Vdi vdi = coilFrom(camera);
