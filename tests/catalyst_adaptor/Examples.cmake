@@ -1,4 +1,4 @@
-# The examples on one rank and on four, and, as a long test, with frames made in separate processes.
+# The examples on two ranks and, as long tests, on one and with frames made in separate processes.
 # Each runs with the adaptor and without it. Its result is the same both times, bit for bit, and on
 # any number of ranks. An example is skipped if its Debian package is missing.
 set(examplesTest "${CMAKE_CURRENT_SOURCE_DIR}/examples.py")
@@ -18,9 +18,9 @@ endfunction()
 # vdi_add_example_test(<folder> program...)
 function(vdi_add_example_test folder)
   set(example example_${folder})
-  foreach(run np1 np4 isolated)
+  foreach(run np1 np2 isolated)
     set(name ${example}_${run})
-    set(ranks 4)
+    set(ranks 2)
     set(variables "PYTHONPATH=${CMAKE_BINARY_DIR}/python")
     if(run STREQUAL np1)
       set(ranks 1)
@@ -36,9 +36,10 @@ function(vdi_add_example_test folder)
     vdi_test_properties(${name} TIMEOUT 120 LABELS paraview ENVIRONMENT ${variables})
     set_tests_properties(${name} PROPERTIES FIXTURES_SETUP ${name}_done)
   endforeach()
-  vdi_compare_examples(${example}_ranks ${folder} ${example}_np1 ${example}_np4)
-  vdi_compare_examples(${example}_isolated_same ${folder} ${example}_np4 ${example}_isolated)
-  set_tests_properties(${example}_isolated ${example}_isolated_same PROPERTIES LABELS "paraview;long")
+  vdi_compare_examples(${example}_ranks ${folder} ${example}_np1 ${example}_np2)
+  vdi_compare_examples(${example}_isolated_same ${folder} ${example}_np2 ${example}_isolated)
+  set_tests_properties(${example}_np1 ${example}_ranks ${example}_isolated ${example}_isolated_same
+                       PROPERTIES LABELS "paraview;long")
   add_test(NAME example_${folder}_json COMMAND $<TARGET_FILE:vdi_tool> check "${examplesFolder}/${folder}/vdi.json")
   vdi_test_properties(example_${folder}_json TIMEOUT 20 LABELS paraview)
 endfunction()

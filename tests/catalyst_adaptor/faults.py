@@ -1,5 +1,5 @@
 """Scripts with faults, of which VDI_TEST_FAULT selects one. Unless a comment says otherwise, steps 1 and 2 fail and
-step 3 succeeds."""
+step 3 succeeds. Of several faults, separated by commas, each has three steps in turn."""
 
 import os
 
@@ -9,7 +9,7 @@ from paraview.modules.vtkRemotingCore import vtkProcessModule
 
 LoadPlugin(os.environ["VDI_PLUGIN"], remote=False, ns=globals())
 
-FAULT = os.environ["VDI_TEST_FAULT"]
+FAULT = TURNS = os.environ["VDI_TEST_FAULT"]
 OUTPUT = os.environ["VDI_TEST_FOLDER"] if "VDI_TEST_FOLDER" in os.environ else os.environ["VDI_OUTPUT"]
 rank = vtkProcessModule.GetProcessModule().GetPartitionId()
 
@@ -55,6 +55,11 @@ def map_range():
 
 
 def execute(info):
+    global FAULT
+    step_of_fault = info.timestep
+    if "," in TURNS:
+        FAULT = TURNS.split(",")[(info.timestep - 1) // 3]
+        step_of_fault = (info.timestep - 1) % 3 + 1
     if FAULT == "defaults" and info.timestep > 1:
         # No fault: checks what the previous step has left, in which only the extractor updated the filter.
         if map_range() != [0, 240]:
@@ -80,7 +85,7 @@ def execute(info):
         data = saved.GetClientSideObject().GetOutputDataObject(0)
         if rank == 0 and data.GetFieldData().GetArray("VDI.parameters").GetValue(3) != info.timestep:
             raise RuntimeError("the file that SaveData wrote has another step")
-    if info.timestep > 2:
+    if step_of_fault > 2:
         if FAULT == "folder":
             make_room()
         return

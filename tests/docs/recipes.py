@@ -39,13 +39,13 @@ def sets_range(name, text):
     return "RescaleTransferFunction(" in text or '"colors": {"range":' in text
 
 
-def recipe(name, runs):
+def recipe(name, runs, part="recipes"):
     """Registers a function as the test of a recipe's file. It is called in the folder in which `runs` has
-    run the recipe."""
+    run the recipe. Its part is "recipes", or "recipes_long" in long runs."""
     recipe_text = text_of(path_of(name))
 
     def register(function):
-        @tests("recipes", "docs/recipes.md", recipe_text)
+        @tests(part, "docs/recipes.md", recipe_text)
         @functools.wraps(function)
         def test(text):
             assert text == recipe_text, "the page has more than the file"
@@ -229,7 +229,7 @@ def of_tetrahedra(name):
     return os.getcwd()
 
 
-@recipe("tetrahedra.py", of_tetrahedra)
+@recipe("tetrahedra.py", of_tetrahedra, "recipes_long")
 def tetrahedra():
     differ([picture_of("bar_%06d.vdi" % step) for step in (0, 1)])
 
@@ -240,7 +240,7 @@ def of_part(name):
     return os.getcwd()
 
 
-@recipe("subcommunicator.py", of_part)
+@recipe("subcommunicator.py", of_part, "recipes_long")
 def subcommunicator():
     picture_of("part_000001.vdi")
 

@@ -22,7 +22,7 @@ def drawn_box(view):
 
 source, center = waves_source()
 set_colors("field", 20, 250, peak=0.6)
-view = make_view([240, 240], list(center + [70, 60, 130]), list(center))
+view = make_view([160, 160], list(center + [70, 60, 130]), list(center))
 SCALE, SHIFT = [0.6, 0.5, 0.7], [10.3, 20.1, 15.7]
 for name, shade in (("unshaded", 0), ("shaded", 1)):
     theirs = paraview_volume(source, view, "CELLS", "field", 2.0, Shade=shade, UseCropping=1, CroppingOrigin=SHIFT,

@@ -12,8 +12,7 @@ from pvtest import *  # noqa: F403
 
 VARIANTS = {  # name: (layout, kind, cell data, parallel scale)
     "random": ("random", "float32", False, None),
-    "cells": ("random", "float32", True, None),
-    "uint16_parallel": ("random", "uint16", False, 0.75),
+    "uint16_cells_parallel": ("random", "uint16", True, 0.75),
 }
 mode = sys.argv[1]
 for name, (layout, kind, as_cells, scale) in VARIANTS.items():
