@@ -11,7 +11,7 @@ from paraview import simple
 from pvtest import check
 from vtkmodules.vtkRenderingCore import VTK_STEREO_RIGHT
 
-SIZE, CAMERA, CENTER = [320, 240], [80, 56, 92], [0, 0, 0]
+SIZE, CAMERA, CENTER = [200, 150], [80, 56, 92], [0, 0, 0]
 VDI = os.path.join(pvtest.OUTPUT, "representation.vdi")
 
 
@@ -147,7 +147,7 @@ def window_column(view, source):
 
 def stereo():
     """The right eye sees a ball of the VDI where it sees the same one as a surface, before and behind the focal point."""
-    view = pvtest.make_view(SIZE, CAMERA, CENTER)
+    view = pvtest.make_view([320, 240], CAMERA, CENTER)
     pvtest.set_colors("inside", -0.5, 0.5)
     columns = {}
     for centre in ((14, 10, 18), (-14, -8, -20)):
