@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# vdi bench on several ranks. $1: vdi, $2: mpirun and its options, as one word list, $3: icet if vdi was built with it.
+# vdi bench on several ranks, and its long suites on one. $1: vdi, $2: mpirun and its options, as one word list, $3: icet
+# if vdi was built with it.
 set -uo pipefail
 vdi=$1
 read -r -a mpirun <<<"$2"
@@ -89,6 +90,33 @@ for wrong in "--rank-counts 3" "--layouts spiral" "--size-per-rank 5x5" "--scali
   read -r -a options <<<"$wrong"
   fails "^vdi: " "${mpirun[@]}" 2 "$vdi" bench --suite ranks "${small[@]}" "${options[@]}"
 done
+
+# The other suites, which run on one rank.
+single=(--size 24x20x16 --resolution 80x60 --supersegments 8)
+works "bench all around" "$vdi" bench --suite viewpoints --fields turbulence "${single[@]}" --viewpoints 2 --zooms 4 \
+  --margins 0 1 --truth-rate 2 -o around.json
+holds "all around" <<'P'
+import json
+rows = json.load(open("around.json"))["rows"]
+assert len(rows) == 4, len(rows)  # two margins, two kinds of viewpoints
+row = {(r["views"], r["margin"]): r for r in rows}
+cut, kept = (row["turned 20", margin] for margin in (0, 1))
+assert cut["missing_most"] > 0.01 > 0.002 > kept["missing_most"], (cut, kept)
+assert kept["ssim"] > cut["ssim"] and kept["stored_bytes"] > cut["stored_bytes"], (cut, kept)
+P
+works "bench on the way to a viewer" "$vdi" bench --suite stream --fields turbulence "${single[@]}" --frames 3 \
+  --period 200 --rates 1Gbit -o stream.json
+holds "on the way to a viewer" <<'P'
+import json
+rows = json.load(open("stream.json"))["rows"]
+assert [row["way"] for row in rows] == ["live", "folder"], rows
+for row in rows:
+    assert row["frames_seen"] >= 2 and row["frames_per_second"] > 0 and row["age_ms"] > 0, row
+    assert 0 < row["object_ssim_first"] <= row["object_ssim_full"] + 1e-3 <= row["ssim_full"] + 0.01, row
+    assert row["encode_ms"] > 0 and row["step_ms"] > 0 and row["crowd_step_ratio"] > 0, row
+P
+fails "rates" "$vdi" bench --suite stream --fields sphere "${single[@]}" --rates fast -o x.json
+fails "zooms" "$vdi" bench --suite viewpoints --fields sphere "${single[@]}" --zooms 0 -o x.json
 
 # The rival: volume rendering composited by IceT has our picture, wherever the blocks are.
 if [ "$3" != icet ]; then
