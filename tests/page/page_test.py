@@ -1,5 +1,6 @@
 """Compares the exported page in Chromium with vdi render, by real input events, and tests bad input. With the
-argument speed it compares the CPU time of views instead."""
+argument speed it compares the CPU time of views instead, with the argument more it tests further kinds of windows and
+GPUs."""
 import base64
 import io
 import json
@@ -27,12 +28,12 @@ def test_pictures(browser):
         whole(browser)
         bare(browser)
         start = camera_of(browser)
-        angles = (0, 10, 30, 90) if name == "compact" else (30, 90)
+        angles = (0, 30, 90) if name == "compact" else (30,) if name in ("full", "surface") else (90,)
         vdi("render", f"{name}.vdi", "-o", f"{name}.png", "--resolution", f"{WIDTH}x{HEIGHT}", "--azimuth", *angles)
         for degrees in angles:
             camera = azimuth(start, degrees)
             browser.value(f"vdiPage.setCamera({json.dumps(camera)}, false)")
-            expected = images.imread(f"{name}_{degrees}deg.png")[..., :3]
+            expected = images.imread(f"{name}_{degrees}deg.png" if len(angles) > 1 else f"{name}.png")[..., :3]
             compare(f"{name}, {degrees} degrees", shown(browser, f"{name}_{degrees}"), expected)
         if name in ("compact", "parallel"):
             browser.value("document.getElementById('smooth').click()")
@@ -128,7 +129,7 @@ def check_culling(browser):
     size = np.max(high - low)
     random = np.random.RandomState(3)
     blank, seen = [], 0
-    for i in range(24):
+    for i in range(12):
         reach = size * (0.1, 0.4, 0.8, 1.5, 3)[i % 5]
         camera = {**start, "position": list((low + high) / 2 + reach * random.normal(size=3)),
                   "focalPoint": list((low + high) / 2 + 0.2 * size * random.normal(size=3)),
@@ -139,7 +140,7 @@ def check_culling(browser):
         blank.append(view["blank"])
         seen += view["seen"]
     print(f"culled {np.mean(blank):.2f} of the regions of {len(blank)} views, {seen} of which show something", flush=True)
-    check(seen > 12 and 0.1 < np.mean(blank) < 0.9, "views show something, and regions are culled")
+    check(seen > 6 and 0.1 < np.mean(blank) < 0.9, "views show something, and regions are culled")
 
 
 def test_culling_perspective(browser):
@@ -656,7 +657,7 @@ def test_framing(browser):
         "--transfer-function", "cube.json", "-o", cube)
     open_page(browser, page_of(cube, "parallel.vdi"))
     whole(browser)
-    for width, height in ((360, 240), (320, 568), (568, 320), (800, 450), (1000, 300)):
+    for width, height in ((360, 240), (320, 568), (1000, 300)):
         browser.size(width, height)
         for frame in (0, 1):
             browser.value(f"vdiPage.show({frame})")
@@ -757,7 +758,8 @@ def test_network(browser):
 
 if sys.argv[4:] == ["speed"]:
     run(test_frame_time)
-run(test_pictures, test_culling_perspective, test_culling_parallel, test_small_textures, test_hands,
-    test_narrow_window, test_screenshot, test_clipping, test_screenshots, test_tools, test_damage,
-    test_without_webgl, test_series, test_legend, test_looks, test_first_look, test_framing, test_many_contexts,
-    test_opening, test_network)
+if sys.argv[4:] == ["more"]:
+    run(test_pictures, test_culling_perspective, test_culling_parallel, test_small_textures, test_narrow_window, test_series,
+        test_looks, test_many_contexts, test_network)
+run(test_pictures, test_culling_perspective, test_hands, test_screenshot, test_clipping, test_screenshots, test_tools,
+    test_damage, test_without_webgl, test_series, test_legend, test_first_look, test_framing, test_opening, test_network)
