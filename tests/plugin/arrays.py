@@ -172,7 +172,8 @@ simple.Render(view)
 check(list(shown.ColorArrayName) == ["FIELD", "temperature"] and shown.LookupTable == image.LookupTable, "the VDI has a legend")
 offered = shown.SMProxy.GetProperty("ColorArrayName").GetDomain("array_list")
 names = [offered.GetString(i) for i in range(offered.GetNumberOfStrings())]
-check(names == ["temperature"], "Coloring offers the array, and no internal one %s" % names)
+check(names == sorted(["a", "temperature", "flat", "Q criterion", "velocity", "rgb", "complex"]),
+      "the toolbar offers the input's arrays, and no internal one %s" % names)
 shown.SetScalarBarVisibility(view, True)
 bar = simple.GetScalarBar(image.LookupTable, view)
 check(bar.Visibility == 1 and bar.Title == "temperature", "the scalar bar says what it shows")
@@ -192,6 +193,21 @@ simple.Render(view)
 check(shown.LookupTable == image.LookupTable and list(shown.ColorArrayName) == ["FIELD", "a"], "the legend follows the array")
 check(simple.GetScalarBar(image.LookupTable, view).Visibility == 1 and bar.Visibility == 0,
       "the new array's scalar bar replaces the other")
+
+# The toolbar's box of arrays.
+before = image.LookupTable
+shown.SetScalarColoring("velocity", FIELD)
+shown.RescaleTransferFunctionToDataRange(True, False)
+check(list(image.SelectInputScalars) == ["POINTS", "velocity"], "an array chosen in the toolbar is the filter's")
+check(shown.LookupTable == before and range_of(before) == [0, 1], "the legend stays that of the shown VDI meanwhile")
+simple.Render(view)
+check(shown.LookupTable == image.LookupTable != before and list(shown.ColorArrayName) == ["FIELD", "velocity"],
+      "the legend follows the chosen array")
+simple.ColorBy(shown, ("POINTS", "a"))
+simple.ColorBy(shown, ("CELLS", "a"))
+simple.Render(view)
+check(list(image.SelectInputScalars) == ["POINTS", "a"] and list(shown.ColorArrayName) == ["FIELD", "a"],
+      "a script chooses an array likewise; one that the input lacks changes nothing")
 
 # The toolbar's box of components changes the map, and then fits it to the range that the VDI has.
 image.SelectInputScalars = ["POINTS", "velocity"]

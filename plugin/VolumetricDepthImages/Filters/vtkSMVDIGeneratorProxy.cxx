@@ -11,8 +11,10 @@
 #include <vtkPVDataInformation.h>
 #include <vtkPVTemporalDataInformation.h>
 #include <vtkProcessModule.h>
+#include <vtkSMArrayListDomain.h>
 #include <vtkSMComparativeViewProxy.h>
 #include <vtkSMOutputPort.h>
+#include <vtkSMProperty.h>
 #include <vtkSMPropertyHelper.h>
 #include <vtkSMProxy.h>
 #include <vtkSMProxyIterator.h>
@@ -30,6 +32,7 @@
 #include <exception>
 #include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <numbers>
 #include <utility>
@@ -287,6 +290,32 @@ void vtkSMVDIGeneratorProxy::TakeArrayFromView() {
   const bool together =
       pv::takesComponentsTogether(shown) && vdi::componentIssue(vdi::together, components).empty();
   vtkSMPropertyHelper(this, "Component").Set(together ? vdi::together : pv::componentNamedBy(map));
+}
+
+std::map<std::string, int> vtkSMVDIGeneratorProxy::ArraysOfInput() {
+  std::map<std::string, int> arrays;
+  auto* domain = this->GetProperty("SelectInputScalars")->FindDomain<vtkSMArrayListDomain>();
+  for (unsigned int i = 0; domain != nullptr && i < domain->GetNumberOfStrings(); ++i) {
+    const char* name = domain->GetString(i);
+    if (const int components = this->ComponentsOf(name, domain->GetFieldAssociation(i)); components > 0)
+      arrays[name] = components;
+  }
+  return arrays;
+}
+
+bool vtkSMVDIGeneratorProxy::ChooseArray(const std::string& name, int association) {
+  const Subject before = this->CurrentSubject();
+  std::vector<int> accepted{association};
+  if (association == vtkDataObject::FIELD)
+    accepted = {before.Association, vtkDataObject::POINT, vtkDataObject::CELL};
+  const auto has = [&](int each) { return this->ComponentsOf(name, each) > 0; };
+  const auto found = std::ranges::find_if(accepted, has);
+  if (found == accepted.end()) return false;
+  if (name == before.Array && *found == before.Association) return true;
+  SM_SCOPED_TRACE(PropertiesModified).arg("proxy", this).arg("comment", "the array by which it is coloured");
+  vtkSMPropertyHelper(this, "SelectInputScalars").SetInputArrayToProcess(*found, name.c_str());
+  this->UpdateVTKObjects();
+  return true;
 }
 
 int vtkSMVDIGeneratorProxy::ComponentsOf(const std::string& name, int association) {

@@ -32,6 +32,7 @@
 #include <vtkSMSourceProxy.h>
 #include <vtkWeakPointer.h>
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -70,6 +71,14 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// makes the proxy in the window: ParaView has given the property a default by then, and the proxy can't
   /// tell it from a script's choice.
   void TakeArrayFromView();
+
+  /// The arrays of the input that SelectInputScalars may name, with their numbers of components. An array of
+  /// points and one of cells with the same name count once.
+  std::map<std::string, int> ArraysOfInput();
+
+  /// Sets SelectInputScalars to the array of that name and association: that of points or cells, or
+  /// vtkDataObject::FIELD for either, preferably the present one. Returns false if the input has none.
+  bool ChooseArray(const std::string& name, int association);
 
   /// Sets CroppingBox to the input's bounds, for the panel to show, if Cropping is ticked, applied or not,
   /// and no box has been set. UpdateVTKObjects sends them.

@@ -1,9 +1,13 @@
 #include "vtkSMVDIRepresentationProxy.h"
 
 #include <vtkDataObject.h>
+#include <vtkDoubleArray.h>
+#include <vtkFieldData.h>
+#include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
 #include <vtkPVArrayInformation.h>
+#include <vtkPVDataInformation.h>
 #include <vtkSMCoreUtilities.h>
 #include <vtkSMProperty.h>
 #include <vtkSMPropertyHelper.h>
@@ -12,9 +16,12 @@
 #include <vtkSMTransferFunctionProxy.h>
 #include <vtkScalarsToColors.h>
 
+#include <cmath>
+#include <cstddef>
 #include <numbers>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "VDIMaps.h"
@@ -57,6 +64,9 @@ void setMaps(vtkSMProxy* colors, vtkSMProxy* opacities, const vdi::Coloring& col
 
 }  // namespace
 
+vtkSMVDIRepresentationProxy::vtkSMVDIRepresentationProxy() = default;
+vtkSMVDIRepresentationProxy::~vtkSMVDIRepresentationProxy() = default;
+
 bool vtkSMVDIRepresentationProxy::SetRepresentationType(const char* type) {
   const bool isOwn = type != nullptr && type == ownType;
   if (this->GetUsingScalarColoring()) this->DropLegend();
@@ -77,6 +87,57 @@ void vtkSMVDIRepresentationProxy::ViewUpdated(vtkSMProxy* view) {
   this->Superclass::ViewUpdated(view);
 }
 
+void vtkSMVDIRepresentationProxy::UpdateVTKObjects() {
+  this->Superclass::UpdateVTKObjects();
+  this->TakeChoice();
+}
+
+int vtkSMVDIRepresentationProxy::LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) {
+  this->Named.clear();  // a state's filter has the state's array
+  return this->Superclass::LoadXMLState(element, locator);
+}
+
+void vtkSMVDIRepresentationProxy::LoadState(const vtkSMMessage* state, vtkSMProxyLocator* locator) {
+  this->Named.clear();
+  this->Superclass::LoadState(state, locator);
+}
+
+/// The filter whose VDI is shown; null if it is a file's, or another type is shown.
+vtkSMVDIGeneratorProxy* vtkSMVDIRepresentationProxy::ShownGenerator() {
+  const char* type = vtkSMPropertyHelper(this, "Representation").GetAsString();
+  if (type == nullptr || type != ownType) return nullptr;
+  return vtkSMVDIGeneratorProxy::SafeDownCast(pv::proxyIn(this, "Input"));
+}
+
+vtkPVDataInformation* vtkSMVDIRepresentationProxy::GetRepresentedDataInformation() {
+  vtkSMVDIGeneratorProxy* generator = this->ShownGenerator();
+  if (generator == nullptr) return this->Superclass::GetRepresentedDataInformation();
+  vtkNew<vtkImageData> named;
+  for (const auto& [name, components] : generator->ArraysOfInput()) {
+    // ParaView fits the map to the range of a chosen array. NaN has none.
+    vtkNew<vtkDoubleArray> array;
+    array->SetName(name.c_str());
+    array->SetNumberOfComponents(components);
+    array->InsertNextTuple(std::vector<double>(static_cast<std::size_t>(components), std::nan("")).data());
+    named->GetFieldData()->AddArray(array);
+  }
+  this->ArraysOfInput->Initialize();
+  this->ArraysOfInput->CopyFromObject(named);
+  return this->ArraysOfInput;
+}
+
+/// Gives the filter the array that a user has chosen, or a script. The maps stay those of the shown VDI.
+void vtkSMVDIRepresentationProxy::TakeChoice() {
+  const vtkSMPropertyHelper array(this, "ColorArrayName");
+  const char* name = array.GetInputArrayNameToProcess();
+  if (name == nullptr || *name == '\0' || this->Named == name) return;
+  const bool isChoice = !std::exchange(this->Named, name).empty();
+  vtkSMVDIGeneratorProxy* generator = this->ShownGenerator();
+  if (!isChoice || generator == nullptr) return;
+  if (generator->ChooseArray(name, array.GetInputArrayAssociation()) && this->Colors != nullptr)
+    this->SetMaps(this->Colors, this->Opacities);
+}
+
 /// Whether the representation has a legend. Only the representation VDI is coloured by field data.
 bool vtkSMVDIRepresentationProxy::HasLegend() {
   return this->GetUsingScalarColoring() &&
@@ -87,6 +148,20 @@ void vtkSMVDIRepresentationProxy::DropLegend() {
   vtkSMPropertyHelper(this, "ColorArrayName").SetInputArrayToProcess(vtkDataObject::POINT, "");
   vtkSMPropertyHelper(this, "LookupTable").RemoveAllValues();
   vtkSMPropertyHelper(this, "ScalarOpacityFunction", true).RemoveAllValues();
+  this->Named.clear();
+  this->UpdateVTKObjects();
+}
+
+void vtkSMVDIRepresentationProxy::SetMaps(vtkSMProxy* colors, vtkSMProxy* opacities) {
+  this->Colors = colors;
+  this->Opacities = opacities;
+  vtkSMPropertyHelper(this, "LookupTable").Set(colors);
+  vtkSMPropertyHelper opacity(this, "ScalarOpacityFunction", true);
+  if (opacities != nullptr) {
+    opacity.Set(opacities);
+  } else {
+    opacity.RemoveAllValues();
+  }
   this->UpdateVTKObjects();
 }
 
@@ -139,10 +214,8 @@ void vtkSMVDIRepresentationProxy::TakeLegend(vtkSMProxy* view) {
     if (this->GetUsingScalarColoring()) this->DropLegend();
     return;
   }
-  vtkSMPropertyHelper array(this, "ColorArrayName");
-  vtkSMPropertyHelper colors(this, "LookupTable");
-  vtkSMPropertyHelper opacities(this, "ScalarOpacityFunction", true);
   vtkSMProxy* before = pv::proxyIn(this, "LookupTable");
+  vtkSMPropertyHelper array(this, "ColorArrayName");
   const char* name = array.GetInputArrayNameToProcess();
   if (before == legend.Colors && pv::proxyIn(this, "ScalarOpacityFunction") == legend.Opacities &&
       name != nullptr && legend.Array == name && array.GetInputArrayAssociation() == vtkDataObject::FIELD)
@@ -150,13 +223,8 @@ void vtkSMVDIRepresentationProxy::TakeLegend(vtkSMProxy* view) {
   const bool hadBar =
       view != nullptr && before != nullptr && vtkSMTransferFunctionProxy::IsScalarBarVisible(before, view);
   array.SetInputArrayToProcess(vtkDataObject::FIELD, legend.Array.c_str());
-  colors.Set(legend.Colors);
-  if (legend.Opacities != nullptr) {
-    opacities.Set(legend.Opacities);
-  } else {
-    opacities.RemoveAllValues();
-  }
-  this->UpdateVTKObjects();
+  this->Named = legend.Array;
+  this->SetMaps(legend.Colors, legend.Opacities);
   if (!hadBar || before == legend.Colors) return;
   vtkNew<vtkSMTransferFunctionManager> manager;
   manager->HideScalarBarIfNotNeeded(before, view);

@@ -8,6 +8,10 @@
  * (VDIValues.h), which give ranges and histograms. An opened file brings maps of its own; editing them
  * changes the legend alone.
  *
+ * The toolbar also offers the other arrays of the filter's input. If a user chooses one, or a script colours
+ * the VDI by it, the filter gets it as SelectInputScalars. The legend stays that of the shown VDI until the
+ * next one is there.
+ *
  * ParaView sends the selected part of the data to the client, with all field data even if the selection is
  * empty. These are the VDI's arrays as they are, and sending them takes longer than the rest of a new VDI. So
  * this proxy offers no selection: a VDI has nothing to select.
@@ -15,11 +19,16 @@
 #ifndef vtkSMVDIRepresentationProxy_h
 #define vtkSMVDIRepresentationProxy_h
 
+#include <vtkNew.h>
 #include <vtkSMPVRepresentationProxy.h>
+#include <vtkWeakPointer.h>
 
 #include <string>
 
 #include "vtkVolumetricDepthImagesRepresentationsModule.h"
+
+class vtkPVDataInformation;
+class vtkSMVDIGeneratorProxy;
 
 class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkSMVDIRepresentationProxy
     : public vtkSMPVRepresentationProxy {
@@ -29,6 +38,13 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkSMVDIRepresentationProxy
 
   bool SetRepresentationType(const char* type) override;
   void ViewUpdated(vtkSMProxy* view) override;
+  void UpdateVTKObjects() override;
+  int LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) override;
+  void LoadState(const vtkSMMessage* state, vtkSMProxyLocator* locator) override;
+
+  /// While a filter's VDI is shown, this names the arrays of the filter's input, and says nothing else.
+  /// ParaView offers these arrays in addition to those of the VDI itself.
+  vtkPVDataInformation* GetRepresentedDataInformation() override;
 
   using vtkSMPVRepresentationProxy::RescaleTransferFunctionToDataRangeOverTime;
   /// Takes the range over time from the filter's input, so that time steps needn't become VDIs for it. From
@@ -36,8 +52,8 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkSMVDIRepresentationProxy
   bool RescaleTransferFunctionToDataRangeOverTime(const char* arrayname, int attribute_type) override;
 
  protected:
-  vtkSMVDIRepresentationProxy() = default;
-  ~vtkSMVDIRepresentationProxy() override = default;
+  vtkSMVDIRepresentationProxy();
+  ~vtkSMVDIRepresentationProxy() override;
 
   void SetPropertyModifiedFlag(const char* name, int flag) override;
 
@@ -51,13 +67,20 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkSMVDIRepresentationProxy
     vtkSMProxy* Colors = nullptr;
     vtkSMProxy* Opacities = nullptr;
   };
+  vtkSMVDIGeneratorProxy* ShownGenerator();
   Legend LegendOfInput();
   Legend LegendOfFile(vtkSMProxy* reader);
   void TakeLegend(vtkSMProxy* view);
   void DropLegend();
+  void SetMaps(vtkSMProxy* colors, vtkSMProxy* opacities);
+  void TakeChoice();
   void NameComponent(vtkSMProxy* colors);
   bool HasLegend();
 
+  std::string Named;  // the array by which it was coloured last; "" if a state or nothing tells
+  vtkWeakPointer<vtkSMProxy> Colors;  // its maps
+  vtkWeakPointer<vtkSMProxy> Opacities;
+  vtkNew<vtkPVDataInformation> ArraysOfInput;
   bool TypeIsLinked = false;  // whether the type is linked with the copies in a comparative view
   std::string FileColoring;   // the text from which the maps of an opened file were last made
 };
