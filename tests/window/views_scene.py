@@ -7,7 +7,7 @@ import sys
 from paraview import simple
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.environ["VDI_TEST_SOURCE"]), "window"))
-from inside import show_and_answer  # noqa: E402
+from inside import kept, show_and_answer  # noqa: E402
 
 DATA = """
 import numpy as np
@@ -18,9 +18,10 @@ image.SetDimensions(size, size, size)
 z, y, x = np.meshgrid(*[np.linspace(-1, 1, size, dtype=np.float32)] * 3, indexing="ij")
 fall = np.exp(-2 * (x * x + y * y + z * z))
 vectors = np.stack([fall * np.sin(5 * x), 2 * fall * np.cos(4 * y), 3 * fall * np.sin(6 * z)], axis=3)
-array = numpy_to_vtk(vectors.reshape(-1, 3), deep=1)
-array.SetName("velocity")
-image.GetPointData().AddArray(array)
+for name, values in (("velocity", vectors.reshape(-1, 3)), ("density", 5 * np.sin(4 * x.reshape(-1)) ** 2)):
+    array = numpy_to_vtk(values, deep=1)
+    array.SetName(name)
+    image.GetPointData().AddArray(array)
 """
 
 INFORMATION = """
@@ -50,6 +51,37 @@ def coloring():
     return {"component": made.Component, "ends": [round(points[0], 3), round(points[-4], 3)],
             "title": bars[0].ComponentTitle, "shown": shown_component(),
             "outdated": made.SMProxy.GetProperty("Outdated").GetElement(0) == 1}
+
+
+def legend():
+    """The filter's array, whether the legend has its map, the titles of the scalar bars that the view shows, and whether the
+    VDI is still to be made."""
+    made, view = filter_now(), simple.GetActiveView()
+    made.SMProxy.UpdatePropertyInformation()
+    shown = simple.GetRepresentation(made, view)
+    bars = [each.Title for each in view.Representations
+            if each.GetXMLName() == "ScalarBarWidgetRepresentation" and each.Visibility]
+    return {"array": made.SelectInputScalars[1], "map": [shown.LookupTable == made.LookupTable, bars],
+            "outdated": made.SMProxy.GetProperty("Outdated").GetElement(0) == 1}
+
+
+def opacity():
+    return list(filter_now().LookupTable.ScalarOpacityFunction.Points)
+
+
+def set_rate(rate):
+    filter_now().SamplingRate = rate
+
+
+def let_input_change(changes):
+    """From now on the input is out of date after each update; or no longer. Asks for another VDI."""
+    source, image = [each.GetClientSideObject() for each in (simple.FindSource("Scene"), filter_now())]
+    if changes:
+        kept.append(image.AddObserver("EndEvent", lambda *_: source.Modified()))
+    else:
+        image.RemoveObserver(kept.pop())
+    set_rate(1 if changes else 2)
+    simple.Render()
 
 
 def camera():

@@ -62,6 +62,11 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   /// (vtkVDIGenerator::DeferViews). Off by default: then each update waits for its VDI.
   vtkSetMacro(UpdatesForView, bool);
 
+  /// Whether a view's legend of the VDI is replaced once the view shows the new VDI
+  /// (vtkSMVDIRepresentationProxy::FollowShown). Off by default: then the view's update replaces it.
+  vtkSetMacro(LegendsWait, bool);
+  bool GetLegendsWait() const { return this->LegendsWait; }
+
   void UpdateVTKObjects() override;
   int LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) override;
   /// Loads a state of the undo stack.
@@ -213,6 +218,7 @@ class VTKVOLUMETRICDEPTHIMAGES_EXPORT vtkSMVDIGeneratorProxy : public vtkSMSourc
   Subject CurrentSubject();
 
   bool UpdatesForView = false;
+  bool LegendsWait = false;
   bool Taken = false;                       // whether the proxy has taken the view's properties
   bool HasViewpointOfView = false;          // set by SetViewpoint
   bool Choosing = false;                    // true within ChooseLookupTable and FollowArray

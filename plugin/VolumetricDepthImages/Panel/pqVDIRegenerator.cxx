@@ -4,6 +4,8 @@
 #include <pqAnimationScene.h>
 #include <pqApplicationCore.h>
 #include <pqCoreUtilities.h>
+#include <pqDataRepresentation.h>
+#include <pqOutputPort.h>
 #include <pqPipelineSource.h>
 #include <pqServer.h>
 #include <pqServerManagerModel.h>
@@ -28,6 +30,7 @@
 #include "VDIServers.h"
 #include "VDIViews.h"
 #include "vtkSMVDIGeneratorProxy.h"
+#include "vtkSMVDIRepresentationProxy.h"
 #include "vtkVDIGenerator.h"
 #include "vtkVDIProp.h"
 #include "vtkVDIRepresentation.h"
@@ -190,10 +193,19 @@ void pqVDIRegenerator::beginRender() {
 void pqVDIRegenerator::endRender() {
   auto* view = qobject_cast<pqView*>(this->sender());
   this->ToDraw.removeAll(view);
-  if (view != nullptr && this->isShownIn(view) && pv::isBehind(view)) this->Showing.start();
+  if (view != nullptr && this->isShownIn(view)) this->Showing.start();
   if (!this->IsCaptured) return;
   this->IsCaptured = false;
   this->lookWhetherViewsWait();
+}
+
+/// Lets the legend follow the VDI that the view shows.
+void pqVDIRegenerator::followShown(pqView* view) {
+  for (pqOutputPort* port : this->Source->getOutputPorts()) {
+    const pqDataRepresentation* shown = port->getRepresentation(view);
+    auto* proxy = vtkSMVDIRepresentationProxy::SafeDownCast(shown != nullptr ? shown->getProxy() : nullptr);
+    if (proxy != nullptr && proxy->FollowShown(view->getProxy())) view->render();
+  }
 }
 
 /// Comparative views. Each value or time step in one needs a VDI of its own.
@@ -212,6 +224,7 @@ void pqVDIRegenerator::lookWhetherViewsWait() {
   if (defers == this->Defers) return;
   this->Defers = defers;
   this->Restarts = 0;
+  this->generator()->SetLegendsWait(defers);
   pv::command(this->generator(), defers ? "DeferViews" : "DeferNoViews");
 }
 
@@ -332,16 +345,21 @@ void pqVDIRegenerator::finish() {
 /// Says what the views have yet to show. They draw rough pictures at first, with the last VDI until the next
 /// one is loaded.
 void pqVDIRegenerator::lookWhatIsShown() {
-  if (this->Now == State::Preparing) return;  // which has a note of its own
+  if (this->Now == State::Preparing || this->Restarts > mostRestarts)
+    return;  // these have notes of their own
+  if (!pv::mayAsk(this->Source->getServer())) return;
   this->ToDraw.removeAll(nullptr);
   bool isLoading = !this->ToDraw.isEmpty();
   bool isRough = false;
   for (pqView* view : this->Source->getViews()) {
     if (!this->isShownIn(view)) continue;
+    bool showsLast = this->ToDraw.contains(view);
     for (const vtkVDIProp* vdi : pv::vdisOf(view)) {
-      isLoading |= vdi->IsLoading();
+      showsLast |= vdi->IsLoading();
       isRough |= vdi->IsBehind();
     }
+    isLoading |= showsLast;
+    if (!showsLast && this->Defers) this->followShown(view);
   }
   if (!isLoading && !isRough) this->Showing.stop();
   this->note(isLoading ? tr("Loading the VDI into the view")

@@ -80,6 +80,7 @@ class pqVDIRegenerator : public QObject {
   vtkSMVDIGeneratorProxy* generator() const;
   bool isUsed() const;
   bool isShownIn(pqView* view) const;
+  void followShown(pqView* view);
   QList<pqView*> comparativeViews() const;
   void setAutoView(pqView* view);
   /// The proxy of autoView, if that shows the VDI; null otherwise.

@@ -78,7 +78,9 @@ bool vtkSMVDIRepresentationProxy::SetRepresentationType(const char* type) {
 }
 
 void vtkSMVDIRepresentationProxy::ViewUpdated(vtkSMProxy* view) {
-  if (vtkSMPropertyHelper(this, "Representation").GetAsString() == ownType) this->TakeLegend(view);
+  const vtkSMVDIGeneratorProxy* generator = this->ShownGenerator();
+  const bool waits = generator != nullptr && generator->GetLegendsWait() && this->HasLegend();
+  if (!waits && vtkSMPropertyHelper(this, "Representation").GetAsString() == ownType) this->TakeLegend(view);
   // A comparative view copies the representation before its type is set, and links only later changes.
   if (!this->TypeIsLinked) {
     this->TypeIsLinked = true;
@@ -203,33 +205,39 @@ vtkSMVDIRepresentationProxy::Legend vtkSMVDIRepresentationProxy::LegendOfFile(vt
   return {coloring.array.name, colors, opacities};
 }
 
+bool vtkSMVDIRepresentationProxy::FollowShown(vtkSMProxy* view) {
+  return this->ShownGenerator() != nullptr && this->TakeLegend(view);
+}
+
 /// Takes the legend of the input. If the old map has a bar in `view`, the new map's bar replaces it. `view`
-/// may be null.
-void vtkSMVDIRepresentationProxy::TakeLegend(vtkSMProxy* view) {
-  // While the next VDI is being made, the view shows the last one, of another array perhaps.
-  auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(pv::proxyIn(this, "Input"));
-  if (view != nullptr && generator != nullptr && this->HasLegend() && generator->IsOutdated()) return;
+/// may be null. Returns whether that has changed the legend.
+bool vtkSMVDIRepresentationProxy::TakeLegend(vtkSMProxy* view) {
   const Legend legend = this->LegendOfInput();
   if (legend.Colors == nullptr) {
-    if (this->GetUsingScalarColoring()) this->DropLegend();
-    return;
+    if (!this->GetUsingScalarColoring()) return false;
+    this->DropLegend();
+    return true;
   }
   vtkSMProxy* before = pv::proxyIn(this, "LookupTable");
   vtkSMPropertyHelper array(this, "ColorArrayName");
   const char* name = array.GetInputArrayNameToProcess();
   if (before == legend.Colors && pv::proxyIn(this, "ScalarOpacityFunction") == legend.Opacities &&
       name != nullptr && legend.Array == name && array.GetInputArrayAssociation() == vtkDataObject::FIELD)
-    return;
+    return false;
+  // While the next VDI is being made, the view shows the last one, of another array perhaps.
+  auto* generator = vtkSMVDIGeneratorProxy::SafeDownCast(pv::proxyIn(this, "Input"));
+  if (view != nullptr && generator != nullptr && this->HasLegend() && generator->IsOutdated()) return false;
   const bool hadBar =
       view != nullptr && before != nullptr && vtkSMTransferFunctionProxy::IsScalarBarVisible(before, view);
   array.SetInputArrayToProcess(vtkDataObject::FIELD, legend.Array.c_str());
   this->Named = legend.Array;
   this->SetMaps(legend.Colors, legend.Opacities);
-  if (!hadBar || before == legend.Colors) return;
+  if (!hadBar || before == legend.Colors) return true;
   vtkNew<vtkSMTransferFunctionManager> manager;
   manager->HideScalarBarIfNotNeeded(before, view);
   this->SetScalarBarVisibility(view, true);
   this->NameComponent(legend.Colors);
+  return true;
 }
 
 /// Lets the bars of the map name the component of the filter's array. The view may still show a VDI of

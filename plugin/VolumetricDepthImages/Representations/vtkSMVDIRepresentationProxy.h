@@ -42,6 +42,10 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkSMVDIRepresentationProxy
   int LoadXMLState(vtkPVXMLElement* element, vtkSMProxyLocator* locator) override;
   void LoadState(const vtkSMMessage* state, vtkSMProxyLocator* locator) override;
 
+  /// Gives the representation of a filter whose legends wait (vtkSMVDIGeneratorProxy) the legend of the VDI
+  /// that the view shows, unless the next one is being made. Returns whether that has changed the legend.
+  bool FollowShown(vtkSMProxy* view);
+
   /// While a filter's VDI is shown, this names the arrays of the filter's input, and says nothing else.
   /// ParaView offers these arrays in addition to those of the VDI itself.
   vtkPVDataInformation* GetRepresentedDataInformation() override;
@@ -70,7 +74,7 @@ class VTKVOLUMETRICDEPTHIMAGESREPRESENTATIONS_EXPORT vtkSMVDIRepresentationProxy
   vtkSMVDIGeneratorProxy* ShownGenerator();
   Legend LegendOfInput();
   Legend LegendOfFile(vtkSMProxy* reader);
-  void TakeLegend(vtkSMProxy* view);
+  bool TakeLegend(vtkSMProxy* view);
   void DropLegend();
   void SetMaps(vtkSMProxy* colors, vtkSMProxy* opacities);
   void TakeChoice();
