@@ -67,8 +67,8 @@ check("they must be two, colour and opacity, or four" in said, "one component is
 # properties are added here, and where the filter can't honour them, to displayIssues.
 honoured = """Ambient BlendMode ColorArrayName CroppingOrigin CroppingScale Diffuse InterpolationType IsosurfaceValues
               LookupTable ScalarOpacityFunction ScalarOpacityUnitDistance Shade UseCropping"""
-said = """GlobalIlluminationReach MapScalars MultiComponentsMapping Orientation Position Translation Scale Specular
-          UseSeparateOpacityArray UseTransfer2D VolumeAnisotropy VolumetricScatteringBlending"""
+said = """CoordinateSystem GlobalIlluminationReach MapScalars MultiComponentsMapping Orientation Position Translation Scale
+          Specular UseSeparateOpacityArray UseTransfer2D VolumeAnisotropy VolumetricScatteringBlending"""
 of_those_said = """ColorArray2Component ColorArray2Name OpacityArrayName OpacityComponent Origin SliceFunction SpecularPower
                    TransferFunction2D UseGradientForTransfer2D"""  # they count only beside one of those, or a blend mode
 no_look = "DummyInput ForceUseCache ForcedCacheKey Input Pickable Visibility VolumeRenderingMode"

@@ -271,10 +271,10 @@ std::string displayIssues(vtkSMProxy* shown, bool isTogether) {
   if (isOn(shown, "Shade") && isChanged(shown, "Specular")) {
     add("The view shows highlights (its Specular), but VolumetricDepthImage shades without them.");
   }
-  // ParaView 5.13 has renamed Position to Translation.
-  if (isAnyChanged({"Position", "Translation", "Scale", "Orientation"})) {
-    add("The view moves, scales or turns this volume (its Transforming), but VolumetricDepthImage shows it "
-        "where its data are.");
+  // ParaView 5.13 has renamed Position to Translation, and 6.0 can fix a volume to a display.
+  if (isAnyChanged({"Position", "Translation", "Scale", "Orientation", "CoordinateSystem"})) {
+    add("The view moves, scales or turns this volume (its Transforming, or its Coordinate System), but "
+        "VolumetricDepthImage shows it where its data are.");
   }
   return issues;
 }
