@@ -111,7 +111,11 @@ class OwnedComm {
     if (comm_ == MPI_COMM_NULL) return;
     int finalized = 0;
     MPI_Finalized(&finalized);
-    if (finalized == 0) MPI_Comm_free(&comm_);
+    if (finalized != 0) return;
+    try {
+      callHere("MPI_Comm_free", [this] { return MPI_Comm_free(&comm_); });
+    } catch (...) {  // the communicator stays, as nothing is left that could free it
+    }
   }
   MPI_Comm handle() const { return comm_; }
   MPI_Comm* out() { return &comm_; }

@@ -37,7 +37,7 @@ Preparation::Make makerOf(FrameInputs frame, std::optional<Load> load, const Ori
                           FrameReports& reports) {
   return [frame = std::move(frame), load = std::move(load), origin, step, &reports](
              Volume& volume, const vdi::Progress& progress, vtkVDIImageData* output) {
-    volume.make();  // does nothing on several ranks, because the main thread has done it
+    volume.make();
     if (load) {
       volume.show(*load);
     } else {

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <utility>
 
 #include "VDISession.h"
@@ -79,7 +80,7 @@ bool Volume::isMade() const {
 
 bool Volume::isLost() const {
   const std::scoped_lock lock(mutex_);
-  return device_ != nullptr && device_->isLost();
+  return hasFailed_ || (device_ != nullptr && device_->isLost());
 }
 
 std::shared_ptr<const Shown> Volume::shown() const {
@@ -116,13 +117,27 @@ bool Volume::isWantedBesides(const void* user) const {
          });
 }
 
+void Volume::connect() {
+  if (isConnected_) return;
+  comm_ = hasRanks_ ? communicatorOf(controller_) : vdi::comm::Communicator::serial();
+  isConnected_ = true;
+}
+
 void Volume::make() {
   if (this->isMade()) return;
-  vdi::comm::Communicator comm = hasRanks_ ? communicatorOf(controller_) : vdi::comm::Communicator::serial();
+  if (!comm_)
+    throw vdi::Error(vdi::ErrorCode::DeviceFailure, "an earlier VDI of this volume couldn't be begun");
   std::shared_ptr<vdi::gpu::Device> device;
-  comm.together([&] { device = sharedDevice(comm.localRank()); });
-  const vdi::GeneratorOptions options = vdi::generatorOptionsFromEnvironment(comm);
-  generator_ = std::make_unique<vdi::VdiGenerator>(device, std::move(comm), options);
+  comm_->together([&] { device = sharedDevice(comm_->localRank()); });
+  const vdi::GeneratorOptions options = vdi::generatorOptionsFromEnvironment(*comm_);
+  try {
+    generator_ =
+        std::make_unique<vdi::VdiGenerator>(device, std::exchange(comm_, std::nullopt).value(), options);
+  } catch (...) {
+    const std::scoped_lock lock(mutex_);
+    hasFailed_ = true;
+    throw;
+  }
   const std::scoped_lock lock(mutex_);
   device_ = std::move(device);
 }

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "VDILoad.h"
+#include "vdi/comm/Communicator.h"
 #include "vdi/comm/Funnel.h"
 #include "vdi/core/Box.h"
 #include "vdi/core/Coloring.h"
@@ -65,7 +66,7 @@ class Volume {
   // Any thread may call the following.
   /// Whether there is a generator.
   bool isMade() const;
-  /// Whether this rank's device was lost; it stays so.
+  /// Whether this rank's device was lost, or no generator can be made on it any more; it stays so.
   bool isLost() const;
   /// The shown blocks; null if there are none. The object never changes.
   std::shared_ptr<const Shown> shown() const;
@@ -81,14 +82,17 @@ class Volume {
   void leave(const void* user);
   /// Whether another user wants the blocks that the volume shows or will show.
   bool isWantedBesides(const void* user) const;
-  /// Makes the generator unless it exists, with the process's device. On several ranks it is collective, and
-  /// the main thread calls it, because no other thread may make a communicator. On one rank, the caller needs
-  /// the turn. Throws vdi::Error on all ranks.
-  void make();
+  /// Makes the communicator for `make` unless that was done, because no other thread may make one.
+  /// Collective. Throws vdi::Error on all ranks.
+  void connect();
+  bool isConnected() const { return isConnected_; }
   /// Carries out the collective operations of the thread that has the turn. Returns after `most`.
   void serve(std::chrono::milliseconds most) { funnel_.serve(most); }
 
   // The holder of the turn.
+  /// Collective: makes the generator unless it exists, with the process's device. Call `connect` before.
+  /// Throws vdi::Error on all ranks.
+  void make();
   vdi::VdiGenerator& generator() { return *generator_; }
   /// Collective: uploads the blocks, unless all ranks show them. After a throw the volume shows nothing.
   void show(const Load& load);
@@ -104,8 +108,11 @@ class Volume {
   std::uint64_t identity_;
   std::map<const void*, std::function<bool(const Origin&)>> users_;
   vdi::comm::Funnel funnel_;
+  bool isConnected_ = false;
+  std::optional<vdi::comm::Communicator> comm_;  // until there is a generator, which takes it
   std::unique_ptr<vdi::VdiGenerator> generator_;
   mutable std::mutex mutex_;  // guards the members below
+  bool hasFailed_ = false;
   std::shared_ptr<vdi::gpu::Device> device_;
   std::shared_ptr<const Shown> shown_;
   std::optional<Origin> target_;

@@ -29,9 +29,10 @@ std::shared_ptr<const Shown> VolumeUse::shownOf(const Origin& origin) const {
 }
 
 bool VolumeUse::hasLostDevice() const {
-  if (!volume_ || !volume_->isMade()) return false;
+  if (!volume_ || !volume_->isConnected()) return false;
   Turn turn(*volume_);
   turn.await();
+  if (!volume_->isMade()) return volume_->isLost();
   const vdi::VdiGenerator& generator = volume_->generator();
   return generator.communicator().anyTogether([&] { return generator.device().isLost(); });
 }

@@ -478,8 +478,7 @@ void vtkVDIGenerator::Prepare() {
 pv::FrameInputs vtkVDIGenerator::AskedFrame() {
   const pv::ViewRequest& asked = *this->Internal->Regeneration.asked();
   this->Internal->Use.choose(this->Controller, asked.load.of);
-  // A thread must not make a communicator of several ranks.
-  if (this->Internal->Use.volume()->hasRanks()) this->Internal->Use.volume()->make();
+  this->Internal->Use.volume()->connect();
   this->Internal->Range.noteChoice(asked.load.of.choice);
   return this->Announced(
       this->CurrentFrame(asked.bounds, asked.load.voxelVolume, {0.0, 1.0}, asked.load.stretch));
@@ -537,6 +536,7 @@ void vtkVDIGenerator::Generate(vtkDataObject* input, const pv::Origin& origin, v
   pv::Volume& volume = *internal.Use.volume();
   pv::Turn turn(volume);
   turn.await();
+  volume.connect();
   volume.make();
   vdi::VdiGenerator& generator = volume.generator();
   internal.Regeneration.dropOther(origin);
