@@ -38,6 +38,7 @@ void Deposits::setBlocks(const Fields& fields) {
 
 void Deposits::make(Fields& fields, const std::string& name, std::int64_t step) {
   setBlocks(fields);
+  comm_.together([&] { fields.fetchParticles(name); });
   const ParticleArray& array = *fields.particlesOf(name);
   DepositedArray made = depositor_.deposit(array.particles, array.kind);
   comm_.together([&] {

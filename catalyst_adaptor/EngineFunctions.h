@@ -39,6 +39,7 @@ typedef struct vdi_catalyst_functions {
   int (*set_array_offset)(vdi_catalyst*, const char*, int32_t, const double*);
   int (*set_array_missing)(vdi_catalyst*, const char*, int32_t, int32_t, const double*);
   int (*set_particles)(vdi_catalyst*, const char*, const vdi_catalyst_particles*);
+  int (*set_stream)(vdi_catalyst*, void*);
   int (*wants)(vdi_catalyst*, int64_t, double);
   void (*wanted_steps)(vdi_catalyst*, int64_t first, int32_t count, uint8_t* wanted);
   int (*execute)(vdi_catalyst*, int64_t, double);
@@ -53,8 +54,8 @@ typedef struct vdi_catalyst_functions {
 } vdi_catalyst_functions;
 
 /* An engine's only symbol. Its name contains the version, so a library of another version lacks it. */
-#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_11
-#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_11"
+#define VDI_CATALYST_ENGINE_FUNCTIONS vdi_catalyst_engine_functions_12
+#define VDI_CATALYST_ENGINE_SYMBOL "vdi_catalyst_engine_functions_12"
 enum { VDI_CATALYST_NOT_ISOLATED = -1 };
 VDI_CATALYST_API extern const vdi_catalyst_functions VDI_CATALYST_ENGINE_FUNCTIONS;
 

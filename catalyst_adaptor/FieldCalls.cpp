@@ -1,6 +1,8 @@
 #include "catalyst_adaptor/FieldCalls.h"
 
 #include <cstddef>
+#include <cstdio>
+#include <exception>
 #include <utility>
 #include <vector>
 
@@ -34,7 +36,7 @@ int setAnyArray(FieldCalls& self, const GivenArray& array, const void* const* da
       require(values.first == nullptr || values.reachable(), "strides that lead beyond the address space");
       all.push_back(values);
     }
-    change = Fields::arrayChange(array.name, cells, array.type, std::move(all));
+    change = self.fields.arrayChange(array.name, cells, array.type, std::move(all));
   });
   if (code == VDI_CATALYST_OK) self.fields.set(std::move(change));
   return code;
@@ -101,7 +103,7 @@ int setParticles(FieldCalls& self, const char* name, const vdi_catalyst_particle
     require(self.haveBlocks, "particles were given before blocks");
     require(name != nullptr && *name != '\0', "an array needs a name");
     array = particleArrayOf(particles);
-    change = Fields::particlesChange(name, array);
+    change = self.fields.particlesChange(name, array);
   });
   if (code == VDI_CATALYST_OK) {
     code = guarded(self, VDI_CATALYST_BAD_ARGUMENT, [&] {
@@ -111,6 +113,17 @@ int setParticles(FieldCalls& self, const char* name, const vdi_catalyst_particle
   }
   if (code == VDI_CATALYST_OK) self.fields.set(std::move(change));
   return code;
+}
+
+int setStream(FieldCalls& self, void* stream) {
+  try {
+    self.fields.gpuMemory().setStream(stream);
+    return VDI_CATALYST_OK;
+  } catch (const std::exception& error) {  // the other ranks don't know of it
+    std::fprintf(stderr, "vdi_catalyst: %s\n", error.what());
+    self.error.assign(error.what());
+  }
+  return VDI_CATALYST_BAD_ARGUMENT;
 }
 
 int checkStep(FieldCalls& self, std::int64_t step, double time, FunctionRef<void()> requireOwn) {
@@ -123,6 +136,7 @@ int checkStep(FieldCalls& self, std::int64_t step, double time, FunctionRef<void
       },
       step);
   if (code != VDI_CATALYST_OK) return code;
+  self.fields.beginStep();
   return guarded(
       self, VDI_CATALYST_BAD_ARGUMENT,
       [&] { requireEqual(self.comm, step, "the ranks give different steps"); }, step);

@@ -36,6 +36,8 @@ int setArrayOffset(FieldCalls& self, const char* name, std::int32_t association,
 int setArrayMissing(FieldCalls& self, const char* name, std::int32_t association, std::int32_t count,
                     const double* values);
 int setParticles(FieldCalls& self, const char* name, const vdi_catalyst_particles* particles);
+/// Not collective. A failure stays on this rank.
+int setStream(FieldCalls& self, void* stream);
 /// The checks with which `execute` begins. `requireOwn` makes those of the engine; it may throw, but must not
 /// communicate.
 int checkStep(FieldCalls& self, std::int64_t step, double time, FunctionRef<void()> requireOwn);

@@ -42,6 +42,10 @@ struct FieldEntries {
     [[maybe_unused]] const Lock lock;
     return catalyst::setParticles(*handle, name, particles);
   }
+  static int setStream(Handle* handle, void* stream) {
+    [[maybe_unused]] const Lock lock;
+    return catalyst::setStream(*handle, stream);
+  }
   static double parameterF64(Handle* handle, const char* name, double value, double low, double high) {
     return inForce(*handle, parametersOf(*handle), name, value, low, high);
   }
@@ -64,6 +68,7 @@ struct FieldEntries {
     table.set_array_offset = setArrayOffset;
     table.set_array_missing = setArrayMissing;
     table.set_particles = setParticles;
+    table.set_stream = setStream;
     table.parameter_f64 = parameterF64;
     table.parameter_i64 = parameterI64;
     table.refuse = refuse;

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "catalyst_adaptor/memory/ReadableMemory.h"
 #include "vdi/core/Error.h"
 
 namespace vdi::catalyst {
@@ -61,6 +62,24 @@ std::string kindOf(bool cells) {
   return cells ? "cells" : "points";
 }
 
+std::string nameOf(const std::string& name, bool cells) {
+  return "the array '" + name + "' of " + kindOf(cells);
+}
+
+std::string nameOf(std::size_t block, const std::string& array) {
+  return "block " + std::to_string(block) + " of " + array;
+}
+
+std::string nameOfParticles(const std::string& name) {
+  return "a part of the particles '" + name + "'";
+}
+
+[[noreturn]] void refuseUnreadable(const std::string& name) {
+  throw std::runtime_error(name +
+                           " can't be read: its memory was freed, is mapped only in part, or is of a device "
+                           "that isn't known here");
+}
+
 }  // namespace
 
 std::size_t bytesOf(int type) {
@@ -70,6 +89,7 @@ std::size_t bytesOf(int type) {
 
 void Fields::setBlocks(std::vector<vdi_catalyst_block> blocks) {
   blocks_ = std::move(blocks);
+  if (!arrays_.empty()) before_.swap(arrays_);
   arrays_.clear();
   offsets_.clear();
   missing_.clear();
@@ -99,7 +119,25 @@ Fields::Change Fields::arrayChange(const std::string& name, bool cells, int type
                                    std::vector<StridedValues> values) {
   Change change;
   change.key_ = {cells, name};
-  change.array_[change.key_] = {type, std::move(values)};
+  std::vector<std::size_t> onDevice;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    try {
+      if (values[i].first != nullptr && gpuMemory_.isOfCuda(*values[i].extent())) onDevice.push_back(i);
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(nameOf(i, nameOf(name, cells)) + " " + error.what());
+    }
+  }
+  Array array{type, {}};
+  if (!onDevice.empty()) {
+    const auto inForce = arrays_.find(change.key_);
+    const auto before = before_.find(change.key_);
+    array.copy = HostCopy::ofBlocks(values, onDevice,
+                                    inForce != arrays_.end()  ? inForce->second.copy
+                                    : before != before_.end() ? before->second.copy
+                                                              : nullptr);
+  }
+  array.values = std::move(values);
+  change.array_[change.key_] = std::move(array);
   return change;
 }
 
@@ -118,10 +156,23 @@ Fields::Change Fields::missingChange(const std::string& name, bool cells, std::v
   return change;
 }
 
-Fields::Change Fields::particlesChange(const std::string& name, const ParticleArray& particles) {
+Fields::Change Fields::particlesChange(const std::string& name, ParticleArray particles) {
   Change change;
   change.key_ = {true, name};
-  change.particles_[name] = particles;
+  const std::size_t count = particles.particles.count;
+  std::vector<NumberColumn*> columns = columnsOf(particles.particles);
+  std::erase_if(columns, [&](const NumberColumn* column) {
+    try {
+      return !gpuMemory_.isOfCuda(extentOf(*column, count));
+    } catch (const std::invalid_argument& error) {
+      throw std::invalid_argument(nameOfParticles(name) + " " + error.what());
+    }
+  });
+  if (!columns.empty()) {
+    const ParticleArray* before = particlesOf(name);
+    particles.copy = HostCopy::ofColumns(columns, count, before != nullptr ? before->copy : nullptr);
+  }
+  change.particles_[name] = std::move(particles);
   return change;
 }
 
@@ -180,6 +231,58 @@ void Fields::dropDeposits() {
   ++changes_;
   for (const auto& [name, values] : deposits_) arrays_.erase({true, name});
   deposits_.clear();
+}
+
+void Fields::fetch(const std::string& name, bool cells) {
+  const auto found = arrays_.find({cells, name});
+  if (found == arrays_.end()) return;
+  const std::array<Entry*, 1> one{&*found};
+  fetch(one);
+}
+
+void Fields::fetchArrays() {
+  std::vector<Entry*> all;
+  for (Entry& entry : arrays_) all.push_back(&entry);
+  fetch(all);
+}
+
+void Fields::fetch(std::span<Entry* const> arrays) {
+  std::vector<std::string> names;  // all before the first copy, which refers to one
+  for (const Entry* entry : arrays) names.push_back(nameOf(entry->first.second, entry->first.first));
+  std::vector<BufferCopy> copies;
+  std::vector<MemoryRange> ranges;
+  std::vector<std::pair<const std::string*, std::size_t>> owners;  // of the ranges: array and block
+  for (std::size_t a = 0; a < arrays.size(); ++a) {
+    const Array& array = arrays[a]->second;
+    if (array.fetched == step_) continue;
+    if (array.copy) array.copy->addTo(copies, names[a]);
+    for (std::size_t i = 0; i < array.values.size(); ++i) {
+      if (array.values[i].first == nullptr) continue;
+      ranges.push_back(*array.values[i].extent());
+      owners.emplace_back(&names[a], i);
+    }
+  }
+  if (ranges.empty()) return;
+  if (const std::optional<std::size_t> bad = firstUnreadable(ranges))
+    refuseUnreadable(nameOf(owners[*bad].second, *owners[*bad].first));
+  if (!copies.empty() || gpuMemory_.hasStream()) gpuMemory_.copy(copies);
+  for (Entry* entry : arrays) entry->second.fetched = step_;
+  before_.clear();
+}
+
+void Fields::fetchParticles(const std::string& name) {
+  const auto found = particles_.find(name);
+  if (found == particles_.end() || found->second.fetched == step_) return;
+  ParticleArray& array = found->second;
+  std::vector<MemoryRange> ranges;
+  for (const NumberColumn* column : columnsOf(array.particles))
+    ranges.push_back(extentOf(*column, array.particles.count));
+  if (firstUnreadable(ranges)) refuseUnreadable(nameOfParticles(name));
+  const std::string owner = nameOfParticles(name);
+  std::vector<BufferCopy> copies;
+  if (array.copy) array.copy->addTo(copies, owner);
+  if (!copies.empty() || gpuMemory_.hasStream()) gpuMemory_.copy(copies);
+  array.fetched = step_;
 }
 
 const Fields::Array* Fields::find(const std::string& name, bool cells) const {

@@ -10,8 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "catalyst_adaptor/HostCopy.h"
 #include "catalyst_adaptor/ParticleArray.h"
 #include "catalyst_adaptor/StridedArray.h"
+#include "catalyst_adaptor/memory/GpuMemory.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
 #include "vdi/comm/Communicator.h"
 #include "vdi/core/Block.h"
@@ -40,13 +42,16 @@ class Fields {
   class Change;
   /// An array's values, one entry for each block, with the same number of components. Blocks that lack the
   /// array have a null `first`. An array of cells replaces particles of that name.
-  static Change arrayChange(const std::string& name, bool cells, int type, std::vector<StridedValues> values);
+  /// Values in a GPU's memory become those of a copy, which `fetch` makes. Throws std::invalid_argument for
+  /// memory that values can't be taken from.
+  Change arrayChange(const std::string& name, bool cells, int type, std::vector<StridedValues> values);
   /// Makes the numbers stand for missing values of that array, instead of those before.
   static Change missingChange(const std::string& name, bool cells, std::vector<double> missing);
   /// Shifts the values of that array by `offset` cells from the points or the centres of cells.
   static Change offsetChange(const std::string& name, bool cells, const std::array<double, 3>& offset);
   /// Particles to deposit into a cell array, which replaces a cell array of that name.
-  static Change particlesChange(const std::string& name, const ParticleArray& particles);
+  /// Numbers in a GPU's memory are treated as in arrayChange.
+  Change particlesChange(const std::string& name, ParticleArray particles);
   void set(Change change) noexcept;
   /// The particles of that name; null if there are none. All ranks have particles of the same names.
   const ParticleArray* particlesOf(const std::string& name) const;
@@ -55,6 +60,16 @@ class Fields {
   void setDeposit(const std::string& name, DepositedValues values);
   bool hasDeposit(const std::string& name) const { return deposits_.contains(name); }
   void dropDeposits();
+
+  /// A step begins, in which values may have changed.
+  void beginStep() { ++step_; }
+  /// Makes values of this step readable: copies those that lie in a GPU's memory, at the step's first call,
+  /// and checks that the host can read the others. Must come before anything reads values of an array or of
+  /// particles. The name need not exist. Throws std::runtime_error.
+  void fetch(const std::string& name, bool cells);
+  void fetchParticles(const std::string& name);
+  void fetchArrays();
+  GpuMemory& gpuMemory() { return gpuMemory_; }
 
   /// Whether this rank has the array, which some of its blocks may lack.
   bool has(const std::string& name, bool cells) const;
@@ -96,12 +111,18 @@ class Fields {
   struct Array {
     int type = VDI_CATALYST_F64;
     std::vector<StridedValues> values;
-    std::uint64_t set = 0;  // the number of the change that first set an array of that name
+    std::uint64_t set = 0;             // the number of the change that first set an array of that name
+    std::shared_ptr<HostCopy> copy{};  // null: all values lie on the host
+    std::uint64_t fetched = 0;         // the step in which the values were made readable
   };
   using Key = std::pair<bool, std::string>;  // whether it is one of cells, and the name
   const Array* find(const std::string& name, bool cells) const;
   void put(std::map<Key, Array>& fresh) noexcept;
+  using Entry = std::pair<const Key, Array>;
+  void fetch(std::span<Entry* const> arrays);
 
+  GpuMemory gpuMemory_;
+  std::uint64_t step_ = 1;
   std::vector<vdi_catalyst_block> blocks_;
   std::uint64_t version_ = 0;
   std::uint64_t changes_ = 0;
@@ -110,6 +131,8 @@ class Fields {
   std::map<Key, std::vector<double>> missing_;
   std::map<std::string, ParticleArray> particles_;
   std::map<std::string, DepositedValues> deposits_;  // the memory of arrays made from particles
+  /// The arrays of the blocks before, whose copies' memory serves arrays of the same names again.
+  std::map<Key, Array> before_;
 };
 
 class Fields::Change {

@@ -384,6 +384,10 @@ int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const char* name,
   RETURN_CALL(int, refusal, set_particles(catalyst, name, particles));
 }
 
+int vdi_catalyst_set_stream(vdi_catalyst* catalyst, void* stream) {
+  RETURN_CALL(int, refusal, set_stream(catalyst, stream));
+}
+
 int vdi_catalyst_wants(vdi_catalyst* catalyst, int64_t step, double time) {
   RETURN_GUARDED_CALL(0, wants(catalyst, step, time));
 }

@@ -61,6 +61,15 @@ ParticleArray particleArrayOf(const vdi_catalyst_particles* given) {
   return array;
 }
 
+std::vector<NumberColumn*> columnsOf(Particles& particles) {
+  std::vector<NumberColumn*> columns;
+  for (NumberColumn* column : {&particles.positions[0], &particles.positions[1], &particles.positions[2],
+                               &particles.weights, &particles.lengths}) {
+    if (*column) columns.push_back(column);
+  }
+  return columns;
+}
+
 std::int64_t identityOf(const char* name, const ParticleArray& array) {
   const std::array<bool, 3>& periodic = array.particles.periodic;
   const std::size_t flags = (array.kind == DepositKind::Density ? 1U : 0U) | (periodic[0] ? 2U : 0U) |

@@ -34,7 +34,7 @@ bool StridedValues::inOrder() const {
   return in;
 }
 
-bool StridedValues::reachable() const {
+std::optional<MemoryRange> StridedValues::extent() const {
   std::int64_t lowest = 0;
   std::int64_t highest = 0;
   const auto add = [&](std::int64_t count, std::int64_t stride) {
@@ -46,10 +46,11 @@ bool StridedValues::reachable() const {
   const auto address = reinterpret_cast<std::uintptr_t>(first);
   if (!add(counts[0], strides[0]) || !add(counts[1], strides[1]) || !add(counts[2], strides[2]) ||
       !add(components, componentStride))
-    return false;
+    return std::nullopt;
   const std::uintptr_t below = 0 - static_cast<std::uintptr_t>(lowest);
   const std::uintptr_t above = static_cast<std::uintptr_t>(highest) + scalarBytes;
-  return below <= address && above <= std::numeric_limits<std::uintptr_t>::max() - address;
+  if (below > address || above > std::numeric_limits<std::uintptr_t>::max() - address) return std::nullopt;
+  return MemoryRange{first + lowest, below + above};
 }
 
 void StridedValues::copyTo(std::byte* to) const {

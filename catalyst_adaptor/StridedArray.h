@@ -5,6 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
+
+#include "catalyst_adaptor/memory/RowCopy.h"
 
 namespace vdi::catalyst {
 
@@ -21,8 +24,9 @@ struct StridedValues {
   std::int64_t scalars() const { return counts[0] * counts[1] * counts[2] * components; }
   /// Whether the values are an array in VTK's order: components side by side, x fastest, no gaps, aligned.
   bool inOrder() const;
-  /// Whether the offsets of all values from `first` fit into 63 bits.
-  bool reachable() const;
+  /// The memory from the first byte of a value to the last one; nullopt if some value's address is none.
+  std::optional<MemoryRange> extent() const;
+  bool reachable() const { return extent().has_value(); }
   std::size_t bytes() const { return static_cast<std::size_t>(scalars()) * scalarBytes; }
   /// Copies the values, as they are now, in VTK's order: `to` has room for `bytes()`.
   void copyTo(std::byte* to) const;

@@ -150,6 +150,13 @@ module vdi_catalyst
       integer(c_int) :: code
     end function
 
+    ! stream: of CUDA Fortran, an integer(cuda_stream_kind), transfer(stream, c_null_ptr).
+    function vdi_catalyst_set_stream(catalyst, stream) bind(c) result(code)
+      import :: c_int, c_ptr
+      type(c_ptr), value :: catalyst, stream
+      integer(c_int) :: code
+    end function
+
     function vdi_catalyst_wants(catalyst, step, time) bind(c) result(wants)
       import :: c_double, c_int, c_int64_t, c_ptr
       type(c_ptr), value :: catalyst

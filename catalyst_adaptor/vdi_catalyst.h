@@ -14,8 +14,8 @@
  *     }
  *     vdi_catalyst_finalize(catalyst);                              before MPI_Finalize
  *
- * All functions but vdi_catalyst_error are collective over the communicator: each rank makes all calls in the
- * same order, even a rank without blocks (count 0, null pointers).
+ * All functions but vdi_catalyst_error and vdi_catalyst_set_stream are collective over the communicator: each
+ * rank makes all calls in the same order, even a rank without blocks (count 0, null pointers).
  *
  * The calls of a handle come one after another, from any thread. A call that begins before another one of the
  * same handle has returned, in another thread, a signal's handler or a script, does nothing and returns
@@ -33,6 +33,14 @@
  * where they are, so they must stay valid and unchanged until it returns. The host holds copies of only the
  * layers beside blocks, and of whole blocks if the blocks' scalar types differ. Arrays made from particles
  * take 4 bytes per cell.
+ *
+ * Pointers to values and particles may lead to memory of CUDA: cudaMalloc's, managed, of pools and mapped,
+ * also block by block beside pointers to the host's. vdi_catalyst_execute copies what a frame needs to the
+ * host, once in a step, and nothing at other steps; memory for the copies stays from step to step. It first
+ * waits for the work that was queued on the stream of vdi_catalyst_set_stream. CUDA is asked only if the
+ * process has loaded libcuda.so.1. Memory of a HIP or Level Zero device is refused with
+ * VDI_CATALYST_BAD_ARGUMENT, as are values that reach beyond their allocation. If memory can't be read any
+ * more at a step, on the host or on a GPU, or CUDA fails, the step fails with VDI_CATALYST_SCRIPT.
  *
  * Scripts are Catalyst scripts: Python files for ParaView's module paraview.catalyst. (Catalyst 2, Kitware's
  * C interface, is another way to hand over data: docs/catalyst-guide.md.) They find the blocks, a
@@ -296,6 +304,15 @@ typedef struct vdi_catalyst_particles {
  * deposit opens a Vulkan device of its own; without one, vdi_catalyst_execute returns VDI_CATALYST_SCRIPT. */
 VDI_CATALYST_API int vdi_catalyst_set_particles(vdi_catalyst* catalyst, const char* name,
                                                 const vdi_catalyst_particles* particles);
+
+/* The CUDA stream (a cudaStream_t or CUstream) on which this rank's values are written: a step that reads
+ * values first waits for the work that was queued on it, for VDI_CUDA_PATIENCE seconds at most (300 by
+ * default), then the step fails. When vdi_catalyst_execute returns, the values may change, in any stream.
+ * Null, as at first: the default stream of each context that has values, which waits for the blocking
+ * streams; and values on the host are read without a wait. The stream must live until another is set or the
+ * run ends. Not collective: it returns VDI_CATALYST_BAD_ARGUMENT on this rank if the process hasn't loaded
+ * CUDA. */
+VDI_CATALYST_API int vdi_catalyst_set_stream(vdi_catalyst* catalyst, void* stream);
 
 /* Returns whether a script will do anything at this step: 1 if it will or if that is unknown, 0 if not; the
  * same on all ranks. After 0, the simulation need neither prepare its values nor call vdi_catalyst_execute.

@@ -71,7 +71,8 @@ if(TARGET vdi_python)
   install(TARGETS vdi_python LIBRARY DESTINATION "${pythonDir}")
   install(FILES vdi/python/pv_vdi/__init__.py DESTINATION "${pythonDir}")
   if(VDI_BUILD_PARAVIEW)
-    install(FILES vdi/python/pv_vdi/catalyst.py vdi/python/pv_vdi/_faults.py DESTINATION "${pythonDir}")
+    install(FILES vdi/python/pv_vdi/catalyst.py vdi/python/pv_vdi/_device.py vdi/python/pv_vdi/_faults.py
+            DESTINATION "${pythonDir}")
     # Programs link libvdi_catalyst.so. At run time they need only the file with the version.
     file(RELATIVE_PATH library "/prefix/${pythonDir}"
          "/prefix/${CMAKE_INSTALL_LIBDIR}/libvdi_catalyst.so.${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR}")

@@ -299,6 +299,7 @@ int IsolatedRun::checked(std::int64_t step, double time) {
 int IsolatedRun::execute(std::int64_t step, double time) {
   if (!process_ && !options_.isolation.restart) return VDI_CATALYST_ENGINE;
   if (process_) process_->listen(Milliseconds(0));
+  self_.fields.beginStep();
   const double now = elapsed();
   const bool isRefused = !self_.haveBlocks || !std::isfinite(time) || (schedule_ ? step < 0 : !isStep(step));
   const bool isGone = process_ && process_->isGone();
@@ -355,7 +356,8 @@ int IsolatedRun::handOver(std::int64_t step, double time, double now) {
   code = guarded(
       self_, VDI_CATALYST_SCRIPT,
       [&] {
-        data.emplace(self_.fields.version(), self_.fields.blocks(), fieldsOf(namedAlone), parameters_.all());
+        data.emplace(self_.fields.version(), self_.fields.blocks(), fetched(fieldsOf(namedAlone)),
+                     parameters_.all());
         process_->reserve(*data);
       },
       step);
@@ -444,6 +446,14 @@ StepFields IsolatedRun::fieldsOf(bool namedAlone) const {
   std::erase_if(all.particles,
                 [&](const StepFields::NamedParticles& particles) { return isUnnamed(particles.name); });
   return all;
+}
+
+/// Makes the values of the fields readable.
+StepFields IsolatedRun::fetched(StepFields fields) {
+  for (const Fields::NamedArray& array : fields.arrays) self_.fields.fetch(array.name, array.cells);
+  for (const StepFields::NamedParticles& particles : fields.particles)
+    self_.fields.fetchParticles(particles.name);
+  return fields;
 }
 
 int IsolatedRun::finish() {

@@ -79,6 +79,7 @@ class IsolatedRun {
   std::vector<std::string> namedArrays() const;
   bool hasNamedFields() const;
   StepFields fieldsOf(bool namedAlone) const;
+  StepFields fetched(StepFields fields);
   Setup setupOf(bool isGoingOn) const;
   double elapsed() const { return std::chrono::duration<double>(Clock::now() - begin_).count(); }
   bool isSteered() const { return options_.run && options_.run->stream && options_.run->stream->steer; }

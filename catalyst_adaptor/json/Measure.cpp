@@ -141,11 +141,12 @@ void Measure::findParts(const comm::Communicator& comm, const Fields& fields, bo
   sources_ = std::move(sources);
 }
 
-std::optional<double> Measure::of(const comm::Communicator& comm, const Fields& fields) {
+std::optional<double> Measure::of(const comm::Communicator& comm, Fields& fields) {
   const bool cells = agreeOnCells(comm, fields, condition_.field, condition_.cells);
   findParts(comm, fields, cells);
   Totals totals;
   comm.together([&] {
+    fields.fetch(condition_.field, cells);
     const std::vector<Block> blocks =
         fields.blocksOf(condition_.field, cells, condition_.component, condition_.missing);
     for (const OwnedPart& part : parts_) totals.take(Sweep(part, blocks[part.block]).run());

@@ -25,7 +25,7 @@ class Measure {
 
   /// Collective: the maximum or minimum, or the mean for Mean and Change; nullopt if no value counts. Throws
   /// on all ranks as agreeOnCells and Fields::blocksOf do.
-  std::optional<double> of(const comm::Communicator& comm, const Fields& fields);
+  std::optional<double> of(const comm::Communicator& comm, Fields& fields);
 
  private:
   /// The part of a block that it owns: along each axis, the length of each value's extent that lies in it, in

@@ -565,6 +565,7 @@ void RunEngine::prepare(Fields& fields, std::int64_t step, double time, const co
   std::vector<Block> blocks;
   std::array<double, 2> largest{};  // the most values per unit of volume, and the most components
   comm.together([&] {
+    fields.fetch(field.array, cells);
     blocks = fields.blocksOf(field.array, cells, field.component, field.missing);
     for (Block& block : blocks) {
       largest[0] = std::max(largest[0], 1.0 / (block.spacing.x * block.spacing.y * block.spacing.z));

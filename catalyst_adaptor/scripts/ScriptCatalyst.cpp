@@ -149,9 +149,12 @@ bool isWanted(const vdi_catalyst& self, std::int64_t step) {
   return wanted != 0;
 }
 
-/// Makes the arrays of all particles if a script will do anything at the step.
-int depositIfWanted(vdi_catalyst& self, std::int64_t step) {
-  if (self.fields.particles().empty() || !isWanted(self, step)) return VDI_CATALYST_OK;
+/// Makes values readable, and the arrays of all particles, if a script will do anything at the step.
+int fetchIfWanted(vdi_catalyst& self, std::int64_t step) {
+  if (!isWanted(self, step)) return VDI_CATALYST_OK;
+  const int code = guarded(
+      self, VDI_CATALYST_SCRIPT, [&] { self.fields.fetchArrays(); }, step);
+  if (code != VDI_CATALYST_OK || self.fields.particles().empty()) return code;
   return guardedTogether(
       self, VDI_CATALYST_SCRIPT,
       [&] {
@@ -235,7 +238,7 @@ void setWantedSteps(vdi_catalyst* catalyst, int64_t first, int32_t count, std::u
 
 /// Runs the scripts on the step's values.
 int runScripts(vdi_catalyst& self, int64_t step, double time) {
-  int code = depositIfWanted(self, step);
+  int code = fetchIfWanted(self, step);
   if (code != VDI_CATALYST_OK) return code;
   code = guarded(
       self, VDI_CATALYST_ENGINE, [&] { self.grid->update(self.fields); }, step);

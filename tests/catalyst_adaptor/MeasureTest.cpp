@@ -21,7 +21,7 @@ namespace {
 
 constexpr int side = 12;  // cells of the domain, of unit spacing
 
-std::optional<double> measured(Kind kind, const comm::Communicator& comm, const Fields& fields,
+std::optional<double> measured(Kind kind, const comm::Communicator& comm, Fields& fields,
                                int component = -1) {
   Measure measure(
       {.measure = kind, .field = "f", .cells = {}, .component = component, .above = {}, .below = {}});
@@ -85,7 +85,7 @@ void checkType(const comm::Communicator& comm, int type, bool cells) {
   Fields fields;
   fields.setBlocks({slab.block});
   fields.set(
-      Fields::arrayChange("f", cells, type, {fields.inOrder(slab.block, type, cells, 1, values.data())}));
+      fields.arrayChange("f", cells, type, {fields.inOrder(slab.block, type, cells, 1, values.data())}));
   // Means of integers: cells' middles make 3 + 3.5 + 0.5 k.
   const double cut = std::is_integral_v<Scalar> && cells ? 0.5 : 0.0;
   const double half = cells ? 0.5 : 0.0;
@@ -139,7 +139,7 @@ TEST_CASE("components, magnitudes and values out of order are measured where the
   strided.scalarBytes = sizeof(float);
   Fields fields;
   fields.setBlocks({slab.block});
-  fields.set(Fields::arrayChange("f", true, VDI_CATALYST_F32, {strided}));
+  fields.set(fields.arrayChange("f", true, VDI_CATALYST_F32, {strided}));
   constexpr double last = side - 1.0;
   CHECK(*measured(Kind::Max, comm, fields, 0) == 2.0 * last);
   CHECK(*measured(Kind::Min, comm, fields, 1) == -last);
@@ -176,7 +176,7 @@ TEST_CASE("what finer blocks cover doesn't count") {
   std::vector<StridedValues> values;
   for (std::size_t i = 0; i < blocks.size(); ++i)
     values.push_back(fields.inOrder(blocks[i], VDI_CATALYST_F64, true, 1, data[i]));
-  fields.set(Fields::arrayChange("f", true, VDI_CATALYST_F64, values));
+  fields.set(fields.arrayChange("f", true, VDI_CATALYST_F64, values));
   CHECK(*measured(Kind::Max, comm, fields) == 10.0);
   CHECK(*measured(Kind::Mean, comm, fields) == Approx(2.0 * 7.0 / 8.0 + 10.0 / 8.0));
 }
@@ -191,8 +191,8 @@ TEST_CASE("NaN doesn't count, and infinite values count only for the extremes") 
   Fields fields;
   const auto set = [&] {
     fields.setBlocks({slab.block});
-    fields.set(Fields::arrayChange("f", true, VDI_CATALYST_F64,
-                                   {fields.inOrder(slab.block, VDI_CATALYST_F64, true, 1, values.data())}));
+    fields.set(fields.arrayChange("f", true, VDI_CATALYST_F64,
+                                  {fields.inOrder(slab.block, VDI_CATALYST_F64, true, 1, values.data())}));
   };
   set();
   CHECK(*measured(Kind::Max, comm, fields) == infinite);
@@ -217,7 +217,7 @@ TEST_CASE("blocks that lack the array don't count") {
   const auto in = [&](int block, const void* data) {
     return fields.inOrder(fields.blocks()[static_cast<std::size_t>(block)], VDI_CATALYST_F64, true, 1, data);
   };
-  fields.set(Fields::arrayChange("f", true, VDI_CATALYST_F64, {in(0, values.data()), in(1, nullptr)}));
+  fields.set(fields.arrayChange("f", true, VDI_CATALYST_F64, {in(0, values.data()), in(1, nullptr)}));
   const double mean = 2.0 + 0.5 * (world.size() - 1);
   CHECK(measured(Kind::Mean, world, fields).value() == Approx(mean));
   // A measure notices when another block gets the array.
@@ -225,9 +225,9 @@ TEST_CASE("blocks that lack the array don't count") {
       {.measure = Kind::Mean, .field = "f", .cells = {}, .component = -1, .above = {}, .below = {}});
   CHECK(measure.of(world, fields).value() == Approx(mean));
   const std::vector<double> ones(64, 1.0);
-  fields.set(Fields::arrayChange("f", true, VDI_CATALYST_F64, {in(0, nullptr), in(1, ones.data())}));
+  fields.set(fields.arrayChange("f", true, VDI_CATALYST_F64, {in(0, nullptr), in(1, ones.data())}));
   CHECK(measure.of(world, fields).value() == Approx(1.0));
-  fields.set(Fields::arrayChange("f", true, VDI_CATALYST_F64, {in(0, nullptr), in(1, nullptr)}));
+  fields.set(fields.arrayChange("f", true, VDI_CATALYST_F64, {in(0, nullptr), in(1, nullptr)}));
   CHECK_THROWS(measure.of(world, fields));
 }
 
@@ -247,9 +247,9 @@ TEST_CASE("a measure follows the array to another block with the same first poin
     const auto in = [&](std::size_t block, const void* data) {
       return fields.inOrder(fields.blocks()[block], VDI_CATALYST_F64, false, 1, data);
     };
-    fields.set(Fields::arrayChange(
-        "f", false, VDI_CATALYST_F64,
-        {in(0, isFine ? nullptr : coarse.data()), in(1, isFine ? fine.data() : nullptr)}));
+    fields.set(
+        fields.arrayChange("f", false, VDI_CATALYST_F64,
+                           {in(0, isFine ? nullptr : coarse.data()), in(1, isFine ? fine.data() : nullptr)}));
     CHECK(measure.of(world, fields).value() == (isFine ? 3.0 : 2.0));
   }
 }
@@ -264,15 +264,15 @@ TEST_CASE("a phase is measured, and an offset doesn't change what a value counts
   Fields fields;
   fields.setBlocks({{{4, 4, 4}, {0, 0, 0}, {0, 0, 0}, {0.0, 0.0, 4.0 * world.rank()}, {1.0, 1.0, 1.0}}});
   fields.set(
-      Fields::arrayChange("f", true, VDI_CATALYST_F64,
-                          {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F64, true, 2, pairs.data())}));
+      fields.arrayChange("f", true, VDI_CATALYST_F64,
+                         {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F64, true, 2, pairs.data())}));
   CHECK(measured(Kind::Max, world, fields, phase).value() == Approx(0.5));
   CHECK(measured(Kind::Max, world, fields, magnitude).value() == Approx(3.0));
   std::vector<double> along;  // 0 to 3 along x
   for (int i = 0; i < 64; ++i) along.push_back(i % 4);
   fields.set(
-      Fields::arrayChange("g", true, VDI_CATALYST_F64,
-                          {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F64, true, 1, along.data())}));
+      fields.arrayChange("g", true, VDI_CATALYST_F64,
+                         {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F64, true, 1, along.data())}));
   Measure mean({.measure = Kind::Mean, .field = "g", .cells = {}, .component = -1, .above = {}, .below = {}});
   CHECK(mean.of(world, fields).value() == Approx(1.5));
   fields.set(Fields::offsetChange("g", true, {-0.5, 0.0, 0.0}));
@@ -314,7 +314,7 @@ TEST_CASE("the mean of a staggered field is the same for one slab and for two") 
       const std::vector<double>& own = values.emplace_back(valuesOf(block));
       strided.push_back(fields.inOrder(block, VDI_CATALYST_F64, cells, 1, own.data()));
     }
-    fields.set(Fields::arrayChange("f", cells, VDI_CATALYST_F64, strided));
+    fields.set(fields.arrayChange("f", cells, VDI_CATALYST_F64, strided));
     CHECK(*measured(Kind::Mean, world, fields) == Approx(sum / length));
     CHECK(*measured(Kind::Max, world, fields) == square(cells ? length - 1 : length));
     CHECK(*measured(Kind::Min, world, fields) == 0.0);

@@ -35,8 +35,8 @@ Fields smallFields() {
   Fields fields;
   fields.setBlocks({blockAt(0.0, 2)});
   fields.set(
-      Fields::arrayChange("E", true, VDI_CATALYST_F32,
-                          {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F32, true, 1, zeros.data())}));
+      fields.arrayChange("E", true, VDI_CATALYST_F32,
+                         {fields.inOrder(fields.blocks()[0], VDI_CATALYST_F32, true, 1, zeros.data())}));
   return fields;
 }
 
@@ -75,7 +75,7 @@ TEST_CASE("fields arrive: strides, offsets, blocks that lack an array, particles
   StridedValues values = fields.inOrder(fields.blocks()[0], VDI_CATALYST_F64, true, 1, &interleaved[0][1]);
   values.strides = {64, 32, 16};
   const StridedValues missing = fields.inOrder(fields.blocks()[1], VDI_CATALYST_F64, true, 1, nullptr);
-  fields.set(Fields::arrayChange("E", true, VDI_CATALYST_F64, {values, missing}));
+  fields.set(fields.arrayChange("E", true, VDI_CATALYST_F64, {values, missing}));
   fields.set(Fields::offsetChange("E", true, {-0.5, 0.0, 0.25}));
   fields.set(Fields::missingChange("E", true, {-9999.0, 1e20}));
 
@@ -93,7 +93,7 @@ TEST_CASE("fields arrive: strides, offsets, blocks that lack an array, particles
   given.periodic[1] = 1;
   fields.set(Fields::missingChange("stars", true, {0.0}));
   fields.set(Fields::offsetChange("stars", true, {0.25, 0.0, -0.5}));
-  fields.set(Fields::particlesChange("stars", particleArrayOf(&given)));
+  fields.set(fields.particlesChange("stars", particleArrayOf(&given)));
 
   const StepFields step = stepOf(fields);
   const Bytes bytes(StepWriter(7, fields.blocks(), step, {{"feed", false, 0.5, 0.0, 1.0}}));
@@ -141,9 +141,9 @@ TEST_CASE("fields arrive: strides, offsets, blocks that lack an array, particles
 TEST_CASE("no particles, and no blocks, arrive as none") {
   Fields fields;
   fields.setBlocks({});
-  fields.set(Fields::arrayChange("E", true, VDI_CATALYST_F32, {}));
+  fields.set(fields.arrayChange("E", true, VDI_CATALYST_F32, {}));
   vdi_catalyst_particles given{};
-  fields.set(Fields::particlesChange("stars", particleArrayOf(&given)));
+  fields.set(fields.particlesChange("stars", particleArrayOf(&given)));
   const StepFields step = stepOf(fields);
   const Bytes bytes(StepWriter(1, fields.blocks(), step, {}));
   const StepData got = StepData::read(bytes.all());
@@ -180,7 +180,7 @@ TEST_CASE("a step whose values would lie outside its memory is refused") {
   given.position_type = VDI_CATALYST_F32;
   given.position_stride = sizeof(float);
   for (const void*& position : given.positions) position = zeros.data();
-  fields.set(Fields::particlesChange("stars", particleArrayOf(&given)));
+  fields.set(fields.particlesChange("stars", particleArrayOf(&given)));
   Bytes bytes(StepWriter(1, fields.blocks(), stepOf(fields), {}));
   const std::span<std::byte> all = std::as_writable_bytes(std::span(bytes.words));
   REQUIRE_NOTHROW(StepData::read(all));
@@ -221,13 +221,13 @@ TEST_CASE("arrays keep the order in which they were first set") {
   };
   for (const char* name : {"V", "A", "V"}) {
     const std::uint64_t before = fields.changes();
-    fields.set(Fields::arrayChange(name, true, VDI_CATALYST_F32, {}));
+    fields.set(fields.arrayChange(name, true, VDI_CATALYST_F32, {}));
     CHECK(fields.changes() != before);
   }
   CHECK(namesInOrder() == std::vector<std::string>{"V", "A"});
   // Particles take the array's place, and their array comes when it is made.
   vdi_catalyst_particles given{};
-  fields.set(Fields::particlesChange("V", particleArrayOf(&given)));
+  fields.set(fields.particlesChange("V", particleArrayOf(&given)));
   CHECK(namesInOrder() == std::vector<std::string>{"A"});
   fields.setDeposit("V", {});
   CHECK(namesInOrder() == std::vector<std::string>{"A", "V"});

@@ -13,6 +13,7 @@
 #include <random>
 #include <vector>
 
+#include "catalyst_adaptor/HostCopy.h"
 #include "tests/Catch.h"
 #include "tests/FuzzTime.h"
 
@@ -67,6 +68,22 @@ StridedValues layoutOf(Random& random) {
   return values;
 }
 
+/// Makes the copy as a GPU would, row by row.
+void copyRows(const catalyst::RowCopy& rows, std::byte* to) {
+  for (std::int64_t d = 0; d < rows.counts[3]; ++d) {
+    for (std::int64_t c = 0; c < rows.counts[2]; ++c) {
+      for (std::int64_t b = 0; b < rows.counts[1]; ++b) {
+        for (std::int64_t a = 0; a < rows.counts[0]; ++a) {
+          const auto at = [&](const std::array<std::int64_t, 4>& strides) {
+            return a * strides[0] + b * strides[1] + c * strides[2] + d * strides[3];
+          };
+          std::memcpy(to + at(rows.toStrides), rows.from + at(rows.fromStrides), rows.rowBytes);
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 
 TEST_CASE("any layout is copied as a plain loop reads it") {
@@ -94,8 +111,43 @@ TEST_CASE("any layout is copied as a plain loop reads it") {
     std::vector<std::byte> copy(values.bytes());
     values.copyTo(copy.data());
     REQUIRE(copy == expected);
+    // The copy of a GPU's values holds the same, and takes only bytes of the values' extent.
+    const catalyst::CopyPlan plan = catalyst::planCopy(values);
+    const catalyst::MemoryRange source = plan.rows.source();
+    REQUIRE((source.begin >= memory.data() && source.begin + source.bytes <= memory.data() + memory.size()));
+    std::vector<std::byte> rows(plan.bytes);
+    copyRows(plan.rows, rows.data());
+    StridedValues copied = plan.copy;
+    copied.first = rows.data() + plan.first;
+    copied.copyTo(copy.data());
+    REQUIRE(copy == expected);
     if (values.inOrder()) REQUIRE(std::memcmp(values.first, expected.data(), expected.size()) == 0);
   } while (!time.isOver());
+}
+
+TEST_CASE("a GPU copies few rows, and few bytes that aren't values") {
+  const auto planOf = [](std::array<std::int64_t, 3> counts, std::array<std::int64_t, 3> strides) {
+    static const std::array<std::byte, 1> somewhere{};
+    StridedValues values;
+    values.first = somewhere.data();
+    values.counts = counts;
+    values.strides = strides;
+    values.scalarBytes = 8;
+    return catalyst::planCopy(values);
+  };
+  const auto rowsOf = [](const catalyst::CopyPlan& plan) {
+    return plan.rows.counts[0] * plan.rows.counts[1] * plan.rows.counts[2] * plan.rows.counts[3];
+  };
+  // In order, with one layer of halo, and as a part of an array of 512 values along each axis.
+  CHECK(rowsOf(planOf({64, 64, 64}, {8, 512, 32768})) == 1);
+  CHECK(rowsOf(planOf({64, 64, 64}, {8, 528, 34848})) == 1);
+  const catalyst::CopyPlan part = planOf({64, 64, 64}, {8, 4096, 2097152});
+  CHECK(rowsOf(part) == 64 * 64);
+  CHECK(part.bytes == 64 * 64 * 64 * 8);
+  CHECK(part.rows.counts[0] == 64);
+  // One field of ten that are interleaved, and one layer of a large array.
+  CHECK(rowsOf(planOf({64, 64, 64}, {80, 5120, 327680})) == 1);
+  CHECK(planOf({1, 512, 512}, {8, 4096, 2097152}).bytes == 512 * 512 * 8);
 }
 
 TEST_CASE("strides lead beyond the address space exactly where wide numbers say so") {

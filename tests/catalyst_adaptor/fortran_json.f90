@@ -25,6 +25,7 @@ program fortran_json
   blocks(1)%cells = n
   blocks(1)%origin = [real(rank * n, c_double), 0.0_c_double, 0.0_c_double]
   code = code + vdi_catalyst_set_blocks(vdi, 1, blocks)
+  code = code + vdi_catalyst_set_stream(vdi, c_null_ptr)
   code = code + vdi_catalyst_set_array(vdi, "V" // c_null_char, vdi_catalyst_f64, vdi_catalyst_cells, [c_loc(values)])
   ! The run's condition: each rank puts a weight of 2 into the middle of the same cell of the first rank's block. Cells
   ! without particles are missing.

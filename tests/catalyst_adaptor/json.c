@@ -102,6 +102,7 @@ static void* intrude(void* unused) {
       vdi_catalyst_set_array_offset(entered, "V", VDI_CATALYST_CELLS, offset),
       vdi_catalyst_set_array_missing(entered, "V", VDI_CATALYST_CELLS, 1, offset),
       vdi_catalyst_set_particles(entered, "P", &none),
+      vdi_catalyst_set_stream(entered, NULL),
       vdi_catalyst_execute(entered, 0, 0.0),
       vdi_catalyst_finalize(entered)};
   for (size_t i = 0; i < sizeof codes / sizeof *codes; ++i) admissions += codes[i] != VDI_CATALYST_BUSY;

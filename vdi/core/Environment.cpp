@@ -24,6 +24,8 @@ constexpr std::array variables{
                         "The number of bands in which a frame is made", false},
     EnvironmentVariable{"VDI_CACHE", "a folder, or 'off'",
                         "The folder for compiled shaders, instead of ~/.cache/pv-vdi", true},
+    EnvironmentVariable{"VDI_CUDA_PATIENCE", "a whole number of seconds, at least 1",
+                        "The time that a step waits for the work on a simulation's CUDA stream", true},
     EnvironmentVariable{"VDI_DEVICE", "an index or a part of a name", "The Vulkan device to use", true},
     EnvironmentVariable{"VDI_ISOLATION", "process, restart or none",
                         "Whether the Catalyst adaptor makes frames in processes of their own", true},

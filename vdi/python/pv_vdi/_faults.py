@@ -37,9 +37,9 @@ def name_bytes(name):
 
 def one_per_block(name, given, blocks):
     """The list of one array for each block."""
-    if isinstance(given, np.ndarray) and given.ndim in (3, 4) and len(given) != blocks:
+    if getattr(given, "ndim", 0) in (3, 4) and len(given) != blocks:
         raise ValueError("the arrays of '%s' are one array of shape %s; write a list with one array for each block, [values]" %
-                         (name, given.shape))
+                         (name, tuple(given.shape)))
     try:
         arrays = list(given)
     except TypeError:

@@ -23,7 +23,7 @@ import sys
 
 import numpy as np
 
-from . import _faults
+from . import _device, _faults
 from ._location import LIBRARY
 
 __all__ = ["Block", "Catalyst", "CatalystError"]
@@ -95,15 +95,16 @@ class _Particles(ctypes.Structure):
                 ("weight_type", ctypes.c_int32), ("length_type", ctypes.c_int32), ("periodic", ctypes.c_int32 * 3)]
 
 
-def _columns(positions):
-    """The columns x, y and z, which share type and stride."""
+def _columns(positions, taken):
+    """The columns x, y and z, which share type and stride. `taken` gives NumPy's array for another library's."""
+    positions = taken("positions", positions)
     if isinstance(positions, np.ndarray):
         if positions.ndim != 2 or positions.shape[1] != 3:
             raise ValueError("positions are %s, not [particle][3]%s" % (
                 positions.shape, "; write positions.T" if positions.ndim == 2 and len(positions) == 3 else ""))
         columns = [positions[:, axis] for axis in range(3)]
     else:
-        columns = [np.asarray(column) for column in positions]
+        columns = [np.asarray(taken("positions", column)) for column in positions]
         if len(columns) != 3 or any(column.ndim != 1 for column in columns):
             raise ValueError("positions are neither one array [particle][3] nor three of x, y and z")
     if len({(column.dtype, column.shape, column.strides) for column in columns}) > 1:
@@ -111,9 +112,11 @@ def _columns(positions):
     return columns
 
 
-def _numbers(what, given, count):
+def _numbers(what, given, count, taken):
     """The array of the particles' numbers, and its stride, which is 0 for one number for all."""
-    array = np.asarray(given)
+    array = np.asarray(taken(what, given))
+    if array.ndim == 0 and _device.is_array(given) and not isinstance(given, np.ndarray):
+        raise ValueError("%s are one number in an array of type %s; write float(%s)" % (what, type(given).__name__, what))
     if array.ndim > 1 or (array.ndim == 1 and len(array) != count):
         raise ValueError("%s are %s, for %d particles" % (what, array.shape, count))
     if array.dtype not in (np.dtype("float32"), np.dtype("float64")):
@@ -128,20 +131,20 @@ def _float_type(what, dtype):
     return _TYPES[dtype]
 
 
-def _particles(positions, weights, lengths, density, periodic):
+def _particles(positions, weights, lengths, density, periodic, taken):
     """The particles as the engine takes them, and the arrays that they point to. Raises ValueError."""
-    columns = _columns(positions)
+    columns = _columns(positions, taken)
     count = len(columns[0])
     made = _Particles(count, _DENSITY if density else _SUM, _float_type("positions", columns[0].dtype),
                       (ctypes.c_void_p * 3)(*(column.ctypes.data for column in columns)), columns[0].strides[0])
     made.periodic[:] = [int(bool(axis)) for axis in np.broadcast_to(periodic, 3)]
     kept = [columns]
     if weights is not None:
-        array, made.weight_stride = _numbers("weights", weights, count)
+        array, made.weight_stride = _numbers("weights", weights, count, taken)
         made.weights, made.weight_type = array.ctypes.data, _float_type("weights", array.dtype)
         kept.append(array)
     if lengths is not None:
-        array, made.length_stride = _numbers("lengths", lengths, count)
+        array, made.length_stride = _numbers("lengths", lengths, count, taken)
         made.lengths, made.length_type = array.ctypes.data, _float_type("lengths", array.dtype)
         kept.append(array)
     return made, kept
@@ -159,6 +162,7 @@ def _load():
     library.vdi_catalyst_set_array_missing.argtypes = [handle, text, ctypes.c_int32, ctypes.c_int32,
                                                        ctypes.POINTER(ctypes.c_double)]
     library.vdi_catalyst_set_particles.argtypes = [handle, text, ctypes.POINTER(_Particles)]
+    library.vdi_catalyst_set_stream.argtypes = [handle, handle]
     library.vdi_catalyst_wants.argtypes = [handle, ctypes.c_int64, ctypes.c_double]
     library.vdi_catalyst_execute.argtypes = [handle, ctypes.c_int64, ctypes.c_double]
     library.vdi_catalyst_parameter_f64.argtypes = [handle, text, ctypes.c_double, ctypes.c_double, ctypes.c_double]
@@ -265,6 +269,8 @@ class Catalyst:
         self._kept = {}  # arrays that the engine points to, by association and name
         self._masked = {}  # those that are copies of masked arrays
         self._offsets = {}  # of arrays of cells
+        self._stream = None  # that of set_stream
+        self._array_stream = None  # that of the arrays, if set_stream wasn't called
         self._shared_error = None  # the last one, which all ranks have raised
         self._is_alone = communicator.Get_size() == 1
         self._run = _Run(self._library, kind, communicator)
@@ -292,6 +298,9 @@ class Catalyst:
         self._kept = {}
         self._masked = {}
         self._offsets = {}
+        if self._array_stream is not None:
+            self._array_stream = None
+            self._library.vdi_catalyst_set_stream(self._handle, None)
 
     def set_array(self, name, arrays, points=False, offset=None, missing=None):
         """The values of one named array: arrays[i] belongs to block i, and is None if the block lacks it. It is [z][y][x], or
@@ -307,11 +316,16 @@ class Catalyst:
         Arrays are kept alive: change them in place between steps, or set others. They are used in place, whatever their
         strides: slices, transposed arrays, one field of several. Raises ValueError, which says what to write, for a shape that
         the block doesn't have and for a type that the engine doesn't know; ranks without such a fault raise CatalystError with
-        the same reason."""
+        the same reason.
+
+        Arrays may be those of other libraries, such as CuPy, PyTorch, JAX and Numba, in CUDA's memory or the host's: whatever
+        has __cuda_array_interface__ or __dlpack__. An array that names its stream has execute() wait for it; set_stream()
+        names another one."""
         association = _POINTS if points else _CELLS
         with self._or_refused():
             key = _faults.name_bytes(name)
-            arrays = _faults.one_per_block(name, arrays, len(self._blocks))
+            arrays = [self._taken("the array of '%s' for block %d" % (name, i), array)
+                      for i, array in enumerate(_faults.one_per_block(name, arrays, len(self._blocks)))]
             masked = [_Masked(array) if isinstance(array, np.ma.MaskedArray) else None for array in arrays]
             arrays = [array if copy is None else copy.values for array, copy in zip(arrays, masked)]
             if offset is None and not points:
@@ -333,6 +347,28 @@ class Catalyst:
             self._check(self._library.vdi_catalyst_set_array_offset(self._handle, key, association, offsets))
             if not points:
                 self._offsets[name] = offset
+
+    def set_stream(self, stream):
+        """Sets the CUDA stream on which this rank's values are written: execute() waits for the work that was queued on it.
+        None means the default stream. `stream` is a handle, or a stream of CuPy, PyTorch or cuda.core. Not collective."""
+        number = _device.stream_handle(stream)
+        code = self._library.vdi_catalyst_set_stream(self._handle, number or None)
+        if code != 0:
+            raise CatalystError(code, self._error())
+        self._stream = number
+
+    def _taken(self, what, given):
+        """NumPy's array on the memory of another library's; everything else unchanged."""
+        array, stream = _device.as_array(what, given, self._stream or self._array_stream)
+        if stream is None or self._stream is not None:
+            return array
+        if self._array_stream not in (None, stream):
+            raise ValueError("%s is written on the stream %d, and others are on %d; write set_stream(stream), with one that "
+                             "waits for all of them" % (what, stream, self._array_stream))
+        if self._array_stream is None:
+            self._check(self._library.vdi_catalyst_set_stream(self._handle, stream))
+            self._array_stream = stream
+        return array
 
     def _faces(self, arrays):
         """The arrays and their offset: those of faces as cells' lower faces, of which the last layer has none. A block without
@@ -384,7 +420,7 @@ class Catalyst:
         a fault raise CatalystError then."""
         with self._or_refused():
             key = _faults.name_bytes(name)
-            made, kept = _particles(positions, weights, lengths, density, periodic)
+            made, kept = _particles(positions, weights, lengths, density, periodic, self._taken)
         self._check(self._library.vdi_catalyst_set_particles(self._handle, key, made))
         self._masked.pop((_CELLS, name), None)
         self._kept[_CELLS, name] = kept  # an array of cells, as far as the engine is concerned
