@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <tuple>
@@ -142,9 +143,32 @@ struct Inside {
   bool isBox() const { return count == (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2]); }
 };
 
-Inside insideOf(const Node& field, const vdi_catalyst_block& block) {
+/// A leaf's values on the host, and their memory if they had to be copied.
+struct Readable {
+  Leaf leaf;
+  std::vector<std::byte> memory;
+};
+
+Readable readableOf(const Node& values, const Leaf& leaf, GpuMemory& gpuMemory) {
+  Readable readable{leaf, {}};
+  if (leaf.count == 0) return readable;
+  const std::int64_t reach = (leaf.count - 1) * leaf.stride;
+  const MemoryRange range{leaf.first + std::min<std::int64_t>(reach, 0),
+                          static_cast<std::size_t>(std::abs(reach)) + leaf.scalarBytes};
+  readable.memory.resize(range.bytes);
+  try {
+    gpuMemory.read(range, readable.memory.data());
+  } catch (const std::invalid_argument& error) {
+    values.refuse(error.what());
+  }
+  readable.leaf.first = readable.memory.data() + (leaf.first - range.begin);
+  return readable;
+}
+
+Inside insideOf(const Node& field, const vdi_catalyst_block& block, GpuMemory& gpuMemory) {
   const Node values = field.at("values");
-  const Leaf marks = values.leaf();
+  const Readable readable = readableOf(values, values.leaf(), gpuMemory);
+  const Leaf& marks = readable.leaf;
   const Counts counts = countsOf(block, VDI_CATALYST_CELLS);
   const Elements elements = elementsOf(field, counts, marks.count);
   const bool isVtk = field.name() == ghostFields[1];
@@ -164,11 +188,11 @@ Inside insideOf(const Node& field, const vdi_catalyst_block& block) {
 }
 
 /// Announces the layers that a field marks as ghosts. Returns false if all cells are ghosts.
-bool addGhosts(const Node& domain, vdi_catalyst_block& block) {
+bool addGhosts(const Node& domain, vdi_catalyst_block& block, GpuMemory& gpuMemory) {
   for (const char* name : ghostFields) {
     const std::optional<Node> field = domain.find(std::string("fields/") + name);
     if (!field || associationOf(*field) != VDI_CATALYST_CELLS) continue;
-    const Inside inside = insideOf(*field, block);
+    const Inside inside = insideOf(*field, block, gpuMemory);
     if (inside.count == 0) return false;
     if (!inside.isBox()) field->refuse("marks cells that aren't whole layers at a block's sides");
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -279,7 +303,7 @@ void Grid::addDomains(const Node& node, int depth) {
 void Grid::addDomain(const Node& domain) {
   const Node topology = onlyTopology(domain);
   vdi_catalyst_block block = blockOf(domain, topology);
-  if (!addGhosts(domain, block)) return;
+  if (!addGhosts(domain, block, gpuMemory_)) return;
   blocks_.push_back(block);
   const std::optional<Node> fields = domain.find("fields");
   if (!fields) return;
@@ -302,7 +326,7 @@ void Grid::addField(const Node& field, const vdi_catalyst_block& block) {
   std::int64_t stride = leaf.stride;
   std::int64_t componentStride = count > 1 ? components[1].first - leaf.first : 0;
   if (!evenlySpaced(components)) {
-    first = copySideBySide(components);
+    first = copySideBySide(values, components);
     componentStride = static_cast<std::int64_t>(leaf.scalarBytes);
     stride = count * componentStride;
   }
@@ -323,14 +347,15 @@ void Grid::addField(const Node& field, const vdi_catalyst_block& block) {
   array.strides.push_back(strides);
 }
 
-const std::byte* Grid::copySideBySide(const std::vector<Leaf>& components) {
+const std::byte* Grid::copySideBySide(const Node& values, const std::vector<Leaf>& components) {
   if (copiesUsed_ == copies_.size()) copies_.emplace_back();
   std::vector<std::byte>& copy = copies_[copiesUsed_++];
   const std::size_t scalar = components.front().scalarBytes;
   const std::size_t value = scalar * components.size();
   copy.resize(static_cast<std::size_t>(components.front().count) * value);
   for (std::size_t c = 0; c < components.size(); ++c) {
-    const Leaf& leaf = components[c];
+    const Readable readable = readableOf(values, components[c], gpuMemory_);
+    const Leaf& leaf = readable.leaf;
     std::byte* to = copy.data() + c * scalar;
     for (std::int64_t i = 0; i < leaf.count; ++i, to += value)
       std::memcpy(to, leaf.first + i * leaf.stride, scalar);

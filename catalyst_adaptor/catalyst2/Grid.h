@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "catalyst_adaptor/catalyst2/Node.h"
+#include "catalyst_adaptor/memory/GpuMemory.h"
 #include "catalyst_adaptor/vdi_catalyst.h"
 
 namespace vdi::catalyst {
@@ -33,6 +34,8 @@ class Grid {
   /// before. Throws std::invalid_argument unless all domains are uniform grids in three dimensions.
   bool read(const std::optional<Node>& data);
 
+  /// Where the values that `read` itself needs are read: marks of ghost cells, and vectors that are copied.
+  GpuMemory& gpuMemory() { return gpuMemory_; }
   const std::vector<vdi_catalyst_block>& blocks() const { return blocks_; }
   /// The arrays that all blocks have.
   const std::map<Key, Array>& arrays() const { return arrays_; }
@@ -45,8 +48,9 @@ class Grid {
   void addDomains(const Node& node, int depth);
   void addDomain(const Node& domain);
   void addField(const Node& field, const vdi_catalyst_block& block);
-  const std::byte* copySideBySide(const std::vector<Leaf>& components);
+  const std::byte* copySideBySide(const Node& values, const std::vector<Leaf>& components);
 
+  GpuMemory gpuMemory_;
   std::vector<vdi_catalyst_block> blocks_;
   std::map<Key, Array> arrays_;
   std::vector<std::string> leftOut_;

@@ -193,6 +193,7 @@ int Session::handOver(std::int64_t step, const Node& params) {
   int code = guarded(
       calls_, VDI_CATALYST_BAD_ARGUMENT,
       [&] {
+        if (const std::optional<Node> stream = params.find("catalyst/vdi/stream")) setStream(*stream);
         const std::optional<Node> channel = channelOf(params);
         all[1] = channel ? 0 : 1;
         const bool same = grid_.read(channel ? std::optional(dataOf(*channel)) : std::nullopt);
@@ -217,6 +218,17 @@ int Session::handOver(std::int64_t step, const Node& params) {
   if (code == VDI_CATALYST_OK) code = setArrays();
   handedOver_ = code == VDI_CATALYST_OK;
   return code;
+}
+
+/// Not collective.
+void Session::setStream(const Node& node) {
+  auto* const stream = reinterpret_cast<void*>(static_cast<std::uintptr_t>(node.whole()));
+  try {
+    grid_.gpuMemory().setStream(stream);
+  } catch (const std::invalid_argument& error) {
+    node.refuse(std::string("is no stream: ") + error.what());
+  }
+  vdi_catalyst_set_stream(catalyst_, stream);
 }
 
 int Session::setArrays() {

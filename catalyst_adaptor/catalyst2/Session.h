@@ -47,6 +47,7 @@ class Session {
   int start();
   int declareParameters();
   int handOver(std::int64_t step, const Node& params);
+  void setStream(const Node& node);
   int setArrays();
   /// This rank's channel, if it has one. Throws std::invalid_argument for several without a choice.
   std::optional<Node> channelOf(const Node& params) const;

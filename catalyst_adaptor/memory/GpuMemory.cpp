@@ -3,6 +3,7 @@
 #include <link.h>
 
 #include <cstddef>
+#include <cstring>
 #include <map>
 #include <optional>
 #include <set>
@@ -10,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "catalyst_adaptor/memory/ReadableMemory.h"
 #include "vdi/core/Environment.h"
 
 namespace vdi::catalyst {
@@ -121,6 +123,21 @@ void GpuMemory::copy(std::span<const BufferCopy> copies) {
       throw std::runtime_error(own.front()->name() + ": " + error.what());
     }
   }
+}
+
+void GpuMemory::read(const MemoryRange& range, std::byte* to) {
+  if (range.bytes == 0) return;
+  const std::byte* from = range.begin;
+  std::shared_ptr<HostBuffer> buffer;
+  if (isOfCuda(range)) {
+    buffer = std::make_shared<HostBuffer>(range.bytes);
+    const BufferCopy one{{range.begin, buffer->data(), range.bytes}, buffer, "a field"};
+    copy(std::span(&one, 1));
+    from = buffer->data();
+  } else if (firstUnreadable({range})) {
+    throw std::invalid_argument("can't be read");
+  }
+  std::memcpy(to, from, range.bytes);
 }
 
 }  // namespace vdi::catalyst

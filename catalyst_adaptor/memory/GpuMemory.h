@@ -42,6 +42,9 @@ class GpuMemory {
   /// Waits for the stream, and then copies. When it returns, the values may change. Throws std::runtime_error
   /// if memory isn't what it was, a copy fails, or the stream takes longer than VDI_CUDA_PATIENCE.
   void copy(std::span<const BufferCopy> copies);
+  /// Reads bytes that may lie in CUDA's memory: waits and copies as `copy` does. `to` has room for them.
+  /// Throws std::invalid_argument, with a text to follow the range's name, if they can't be read.
+  void read(const MemoryRange& range, std::byte* to);
 
  private:
   void look();

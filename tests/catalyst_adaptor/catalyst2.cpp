@@ -7,7 +7,8 @@
 // RUN is a JSON text or the name of a script. The arrays have different orders in memory: interleaved cells,
 // points within a halo, and cells of vectors whose components lie apart. `bad` hands over faulty nodes, most
 // of them on one rank only, and then a sound mesh. `lost` hands over meshes to a run whose processes die.
-// Exit status 0 if all calls returned the expected codes.
+// VDI_TEST_CUDA (cuda.h): through Catalyst, all values and marks of ghost cells lie in CUDA's memory. Exit
+// status 0 if all calls returned the expected codes.
 #include <mpi.h>
 
 #include <algorithm>
@@ -17,12 +18,15 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <functional>
+#include <map>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "catalyst_adaptor/vdi_catalyst.h"
+#include "tests/catalyst_adaptor/cuda.h"
 
 namespace {
 
@@ -206,6 +210,20 @@ void runNative(Layout& layout, const std::string& run, int steps) {
 
 // --- Catalyst 2.
 
+void* stream = nullptr;                 // of CUDA; null: values lie on the host
+std::map<const void*, char*> onDevice;  // by the memory on the host
+
+/// Where the step's values are: on the host, or on their way to CUDA's memory.
+template <typename Number>
+Number* placeOf(std::vector<Number>& values) {
+  if (stream == nullptr) return values.data();
+  const std::size_t bytes = values.size() * sizeof(Number);
+  char*& place = onDevice[values.data()];
+  if (place == nullptr) place = cuda_allocate(bytes);
+  cuda_write(stream, place, values.data(), bytes);
+  return reinterpret_cast<Number*>(place);
+}
+
 int status(catalyst_status code) {
   return static_cast<int>(code);
 }
@@ -215,15 +233,16 @@ void describeValues(const Layout& layout, Piece& piece, Node& field) {
   field["topology"].set(std::string("topo"));
   field["association"].set(std::string(layout.name == "multimesh" ? "vertex" : "element"));
   if (layout.name == "mesh") {
-    field["values"].set_external(piece.interleaved.data(), cells, sizeof(double), 2 * sizeof(double));
+    field["values"].set_external(placeOf(piece.interleaved), cells, sizeof(double), 2 * sizeof(double));
   } else if (layout.name == "multimesh") {
-    field["values"].set_external(piece.padded.data(), static_cast<conduit_index_t>(piece.padded.size()));
+    field["values"].set_external(placeOf(piece.padded), static_cast<conduit_index_t>(piece.padded.size()));
     const std::int64_t width = piece.cells[0] + 1 + 2 * halo;
     field["offsets"].set(std::vector<std::int64_t>{halo, halo, halo});
     field["strides"].set(std::vector<std::int64_t>{1, width, width * (piece.cells[1] + 1 + 2 * halo)});
   } else {
     for (std::size_t c = 0; c < 3; ++c)
-      field["values"][std::string(1, static_cast<char>('u' + c))].set_external(piece.planes[c].data(), cells);
+      field["values"][std::string(1, static_cast<char>('u' + c))].set_external(placeOf(piece.planes[c]),
+                                                                               cells);
   }
 }
 
@@ -244,7 +263,7 @@ void describe(const Layout& layout, std::size_t number, Piece& piece, Node& mesh
     Node marks = mesh[number % 2 == 0 ? "fields/ascent_ghosts" : "fields/vtkGhostType"];
     marks["association"].set(std::string("element"));
     marks["topology"].set(std::string("topo"));
-    marks["values"].set_external(piece.ghosts.data(), static_cast<conduit_index_t>(piece.ghosts.size()));
+    marks["values"].set_external(placeOf(piece.ghosts), static_cast<conduit_index_t>(piece.ghosts.size()));
   } else if (layout.name == "amrmesh") {
     mesh["state/level"].set(piece.level);
     mesh["state/domain_id"].set(rank);
@@ -256,6 +275,7 @@ Node stepNode(Layout& layout, int step) {
   Node node;
   node["catalyst/state/timestep"].set(step);
   node["catalyst/state/time"].set(0.5 * step);
+  if (stream != nullptr) node["catalyst/vdi/stream"].set(reinterpret_cast<std::uint64_t>(stream));
   Node channel = node["catalyst/channels/grid"];
   channel["type"].set(layout.name);
   Node data = channel["data"];
@@ -468,6 +488,10 @@ int main(int argc, char** argv) {
   MPI_Comm_size(MPI_COMM_WORLD, &ranks);
   const std::vector<std::string> given(argv + 1, argv + argc);
   constexpr int steps = 3;
+  if (std::getenv("VDI_TEST_CUDA") != nullptr) {
+    cuda_begin();
+    stream = cuda_stream(0);
+  }
   if (given.size() == 2 && given[0] == "bad") {
     runBad(given[1]);
   } else if (given.size() == 2 && given[0] == "lost") {

@@ -1,9 +1,11 @@
 """Runs a simulation through Catalyst 2's implementation vdi, and through the adaptor itself: the same files, bit for bit.
 
-    catalyst2.py same LAYOUT LAUNCHER... PROGRAM
+    catalyst2.py same LAYOUT CUDA LAUNCHER... PROGRAM
     catalyst2.py script LAUNCHER... PROGRAM
     catalyst2.py bad LAUNCHER... PROGRAM
     catalyst2.py lost DIE_AT LAUNCHER... PROGRAM
+
+CUDA is a library of CUDA (cuda.h), or "": the values lie there as well.
 
 In a folder of its own below the present one. CATALYST_IMPLEMENTATION_PATHS is in the environment.
 """
@@ -54,7 +56,7 @@ def files(folder):
     return found
 
 
-def same(layout, *program):
+def same(layout, cuda, *program):
     folder = "catalyst2_%s_%s" % (layout, program[-2])
     run(folder + "/native", *program, "native", layout, json.dumps(RUN))
     run(folder + "/catalyst", *program, "catalyst", layout, json.dumps(RUN))
@@ -62,6 +64,9 @@ def same(layout, *program):
     assert sorted(made) == ["vdi_000000.vdi", "vdi_000002.vdi"], sorted(made)
     assert made["vdi_000000.vdi"] != made["vdi_000002.vdi"], "nothing has changed from step to step"
     assert made == files(folder + "/native"), "the files differ"
+    if cuda:
+        run(folder + "/cuda", *program, "catalyst", layout, json.dumps(RUN), VDI_TEST_CUDA=cuda)
+        assert made == files(folder + "/cuda"), "the files differ from those of values in CUDA's memory"
 
 
 def script(*program):
