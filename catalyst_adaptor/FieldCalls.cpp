@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <exception>
+#include <new>
 #include <utility>
 #include <vector>
 
@@ -121,7 +122,11 @@ int setStream(FieldCalls& self, void* stream) {
     return VDI_CATALYST_OK;
   } catch (const std::exception& error) {  // the other ranks don't know of it
     std::fprintf(stderr, "vdi_catalyst: %s\n", error.what());
-    self.error.assign(error.what());
+    try {
+      self.error = error.what();
+    } catch (const std::bad_alloc&) {
+      self.error = "out of memory";  // fits into a string without an allocation
+    }
   }
   return VDI_CATALYST_BAD_ARGUMENT;
 }
