@@ -98,7 +98,7 @@ Setup IsolatedRun::setupOf(bool isGoingOn) const {
 
 int IsolatedRun::launch(bool isGoingOn) {
   handedOver_ = settled_ = 0;
-  tiredAt_.reset();
+  timedOutAt_.reset();
   std::array<char, 64> name{};
   std::vector<HostName> hosts;
   int code = guarded(self_, VDI_CATALYST_ENGINE, [&] {
@@ -135,7 +135,7 @@ int IsolatedRun::awaitStart() {
   const Wait result = wait(progress, 1, startLimit).first;
   if (result == Wait::Over) return *process_->startCode();
   return guarded(self_, VDI_CATALYST_ENGINE, [&]() -> std::optional<std::string> {
-    if (result == Wait::Tired) {
+    if (result == Wait::TimedOut) {
       return process_->startCode() ? ""
                                    : "the process that makes frames hasn't started in " +
                                          std::to_string(static_cast<int>(startLimit)) + " s";
@@ -169,18 +169,18 @@ std::pair<IsolatedRun::Wait, std::int64_t> IsolatedRun::wait(Progress progress, 
     const bool isLost = job_ && !process_->startCode() && job_->isOver(Milliseconds(0));
     const std::int64_t mine = progress();
     const bool isGone = (process_->isGone() || isLost) && mine < goal;
-    const auto [gone, behind, tired] =
+    const auto [gone, behind, timedOut] =
         meet<3>(self_.comm, {isGone ? 1 : 0, -mine, isLate || isStoppedLong ? 1 : 0});
     if (-behind >= goal) return {Wait::Over, -behind};
     if (gone != 0) return {Wait::Dead, -behind};
-    if (tired != 0) return {Wait::Tired, -behind};
+    if (timedOut != 0) return {Wait::TimedOut, -behind};
     if (-behind > least) lastGrowth = Clock::now();
     least = -behind;
   }
 }
 
 /// Ends the remaining processes, and reports the loss of the lowest rank that has lost its own.
-int IsolatedRun::bury(std::optional<std::int64_t> step) {
+int IsolatedRun::reapDead(std::optional<std::int64_t> step) {
   const bool restarts = options_.isolation.restart && step;
   const int code = guarded(
       self_, VDI_CATALYST_ENGINE,
@@ -309,7 +309,7 @@ int IsolatedRun::execute(std::int64_t step, double time) {
   if (refused != 0 || highest != ~lowest) return checked(step, time);
   int code = VDI_CATALYST_OK;
   if (gone != 0) {
-    code = bury(step);
+    code = reapDead(step);
     if (!options_.isolation.restart) return code;
   } else if (process_) {
     code = settle(-behind, At{step, time});
@@ -330,18 +330,18 @@ int IsolatedRun::handOver(std::int64_t step, double time, double now) {
     if (code != VDI_CATALYST_OK) return code;
   }
   if (handedOver_ - settled_ >= 2) {
-    if (tiredAt_ == settled_) return leaveOut(step, time);
+    if (timedOutAt_ == settled_) return leaveOut(step, time);
     const double patience =
         isSteered() ? std::numeric_limits<double>::infinity() : options_.isolation.patience;
     if (patience == 0.0) return leaveOut(step, time);
     const auto [result, done] = wait([&] { return process_->doneCount(); }, handedOver_ - 1, patience);
     if (result == Wait::Dead) {
-      const int code = bury(step);
+      const int code = reapDead(step);
       return options_.isolation.restart ? std::max(code, handOver(step, time, now)) : code;
     }
     earlier = settle(done, At{step, time});
-    if (result == Wait::Tired) {
-      tiredAt_ = settled_;
+    if (result == Wait::TimedOut) {
+      timedOutAt_ = settled_;
       return leaveOut(step, time);
     }
   }
@@ -384,11 +384,11 @@ int IsolatedRun::leaveOut(std::int64_t step, double time) {
   // Where viewers may steer, not every step that isn't handed over would have had a frame.
   const bool isLogged = rank_ == 0 && options_.run && options_.run->log.any() && !isSteered();
   try {
-    if (isLogged) untold_.steps.push_back({step, time});
+    if (isLogged) unreportedSkips_.steps.push_back({step, time});
   } catch (const std::bad_alloc&) {  // the log lacks the step
   }
   if (options_.isolation.patience == 0.0) {
-    if (!std::exchange(hasToldOfLeftOut_, true) && rank_ == 0) {
+    if (!std::exchange(hasReportedSkips_, true) && rank_ == 0) {
       std::fprintf(
           stderr,
           "vdi_catalyst: step %lld: left out: two earlier steps' frames are still to be made; further "
@@ -412,7 +412,8 @@ int IsolatedRun::leaveOut(std::int64_t step, double time) {
 
 /// Tells the process about the steps that were left out since the last ones of which it knows.
 void IsolatedRun::tellLeftOut() {
-  if (!untold_.steps.empty() && process_->tellLeftOut(untold_)) untold_.steps.clear();
+  if (!unreportedSkips_.steps.empty() && process_->tellLeftOut(unreportedSkips_))
+    unreportedSkips_.steps.clear();
 }
 
 /// The names of the arrays that a JSON run uses.
@@ -469,8 +470,8 @@ int IsolatedRun::finish() {
                                    : std::max(options_.isolation.patience, startLimit);
   const auto progress = [&] { return process_->doneCount() + (process_->finished() ? 1 : 0); };
   const Wait result = wait(progress, handedOver_ + 1, limit).first;
-  if (result == Wait::Dead) return bury(std::nullopt);
-  if (result == Wait::Tired) {
+  if (result == Wait::Dead) return reapDead(std::nullopt);
+  if (result == Wait::TimedOut) {
     const bool isStopped = process_->isStopped();
     const bool isAnyStopped = isOfAny(isStopped);
     const int code = guarded(self_, VDI_CATALYST_ENGINE, [&]() -> std::optional<std::string> {

@@ -53,11 +53,11 @@ class IsolatedRun {
  private:
   using Clock = std::chrono::steady_clock;
   using Milliseconds = std::chrono::milliseconds;
-  enum class Wait { Over, Dead, Tired };
+  enum class Wait { Over, Dead, TimedOut };
 
   int launch(bool isGoingOn);
   int awaitStart();
-  int bury(std::optional<std::int64_t> step);
+  int reapDead(std::optional<std::int64_t> step);
   void end();
   /// A step of the simulation and its time.
   struct At {
@@ -95,10 +95,10 @@ class IsolatedRun {
   std::unique_ptr<Job> job_;               // the first rank's
   std::int64_t handedOver_ = 0;            // steps since the processes' start, equal on all ranks
   std::int64_t settled_ = 0;               // number of these steps whose results all ranks know
-  std::optional<std::int64_t> tiredAt_;    // `settled_` when a wait was given up
+  std::optional<std::int64_t> timedOutAt_;    // `settled_` when a wait was given up
   std::int64_t leftOut_ = 0;
-  LeftOutSteps untold_;  // the first rank's: steps left out that the process doesn't know of yet, for its log
-  bool hasToldOfLeftOut_ = false;
+  LeftOutSteps unreportedSkips_;  // the first rank's: steps left out that the process doesn't know of yet, for its log
+  bool hasReportedSkips_ = false;
 };
 
 }  // namespace vdi::catalyst

@@ -272,7 +272,7 @@ void RunEngine::deposit(Fields& fields, const std::string& name, std::int64_t st
 }
 
 /// Whether the condition, the share of wall time and the bound of memory let a due frame be made. Collective.
-bool RunEngine::isToBeMade(Fields& fields, std::int64_t step, double time) {
+bool RunEngine::shouldRender(Fields& fields, std::int64_t step, double time) {
   State& state = *state_;
   if (state.measure) {
     const config::RunCondition& condition = state.measure->condition();
@@ -365,7 +365,7 @@ void RunEngine::execute(Fields& fields, Parameters& parameters, std::int64_t ste
   bool isMade = false;
   try {
     if (isDue(step, time)) {
-      isMade = isToBeMade(fields, step, time);
+      isMade = shouldRender(fields, step, time);
       if (isMade) makeAll(fields, step, time, waited, true);
     }
     if (!isMade && state.isAskedFor) makeAll(fields, step, time, waited, false);

@@ -57,7 +57,7 @@ class RunEngine {
   void open(bool isIsolated);
   bool isDue(std::int64_t step, double time);
   void deposit(Fields& fields, const std::string& name, std::int64_t step);
-  bool isToBeMade(Fields& fields, std::int64_t step, double time);
+  bool shouldRender(Fields& fields, std::int64_t step, double time);
   bool hasWallTime(std::int64_t step, double time);
   bool hasHostMemory(std::int64_t step, double time);
   void leaveOut(std::int64_t step, double time, bool& hasTold, FunctionRef<std::string()> causeText);

@@ -35,22 +35,18 @@ std::uint64_t countLoads() {
   return loads;
 }
 
-std::uintptr_t beginOf(const MemoryRange& range) {
-  return reinterpret_cast<std::uintptr_t>(range.begin);
-}
-
 /// Throws std::invalid_argument unless the whole range is memory of the device.
 void requireInside(Cuda& cuda, const Cuda::Memory& memory, const MemoryRange& range) {
-  const std::uintptr_t end = beginOf(range) + range.bytes;
-  if (memory.begin != memory.end && (beginOf(range) < memory.begin || end > memory.end)) {
-    const std::uintptr_t beyond = end > memory.end ? end - memory.end : memory.begin - beginOf(range);
+  const std::uintptr_t end = range.first() + range.bytes;
+  if (memory.begin != memory.end && (range.first() < memory.begin || end > memory.end)) {
+    const std::uintptr_t beyond = end > memory.end ? end - memory.end : memory.begin - range.first();
     throw std::invalid_argument("reaches " + std::to_string(beyond) + " bytes beyond its allocation of " +
                                 std::to_string(memory.end - memory.begin) + " bytes on CUDA's device " +
                                 std::to_string(memory.device));
   }
   if (memory.context != nullptr) return;  // such an allocation is one piece
   if (const std::optional<std::uintptr_t> hole = cuda.firstUnmapped(memory, range)) {
-    throw std::invalid_argument("isn't mapped from byte " + std::to_string(*hole - beginOf(range)) +
+    throw std::invalid_argument("isn't mapped from byte " + std::to_string(*hole - range.first()) +
                                 " on, on CUDA's device " + std::to_string(memory.device));
   }
 }

@@ -18,16 +18,12 @@ struct Close {
   void operator()(std::FILE* file) const { std::fclose(file); }
 };
 
-std::uintptr_t beginOf(const MemoryRange& range) {
-  return reinterpret_cast<std::uintptr_t>(range.begin);
-}
-
 }  // namespace
 
 std::optional<std::size_t> firstUnreadable(const std::vector<MemoryRange>& ranges) {
   std::vector<std::size_t> order(ranges.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::ranges::sort(order, {}, [&](std::size_t i) { return beginOf(ranges[i]); });
+  std::ranges::sort(order, {}, [&](std::size_t i) { return ranges[i].first(); });
   const std::unique_ptr<std::FILE, Close> maps(std::fopen("/proc/self/maps", "re"));
   if (!maps) return std::nullopt;
   auto next = order.begin();
@@ -47,8 +43,8 @@ std::optional<std::size_t> firstUnreadable(const std::vector<MemoryRange>& range
     high = to;
     for (; next != order.end(); ++next) {
       const MemoryRange& range = ranges[*next];
-      if (beginOf(range) < low) return *next;
-      if (beginOf(range) + range.bytes > high) break;  // the next mapping may continue this one
+      if (range.first() < low) return *next;
+      if (range.first() + range.bytes > high) break;  // the next mapping may continue this one
     }
   }
   return next != order.end() ? std::optional(*next) : std::nullopt;

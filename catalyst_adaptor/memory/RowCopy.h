@@ -11,6 +11,7 @@ namespace vdi::catalyst {
 struct MemoryRange {
   const std::byte* begin = nullptr;
   std::size_t bytes = 0;
+  std::uintptr_t first() const { return reinterpret_cast<std::uintptr_t>(begin); }
 };
 
 /// Rows of bytes in memory of a device, and where they go on the host. Row (a, b, c, d) lies at `from` plus
