@@ -10,7 +10,7 @@ using namespace vdi;
 using synthetic::Joint;
 using synthetic::Layout;
 
-TEST_CASE("optical model: several ranks") {
+TEST_CASE("optical model: several ranks", "[long]") {
   struct Case {
     std::size_t stretch;
     Joint joint;

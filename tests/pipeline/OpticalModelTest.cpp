@@ -60,7 +60,7 @@ TEST_CASE("optical model: all types of scalars", "[pictures]") {
   for (const test::Stretch& stretch : test::stretches) checkAll(stretch, Joint::SharedPoints, false, true);
 }
 
-TEST_CASE("optical model: parallel projection, and data of cells", "[pictures]") {
+TEST_CASE("optical model: parallel projection, and data of cells", "[long]") {
   checkAll(test::stretches[0], Joint::SharedPoints, true, true);
   checkAll(test::stretches[3], Joint::Cells, false, true);
   checkAll(test::stretches[7], Joint::Cells, true, true);

@@ -200,7 +200,7 @@ TEST_CASE("rays continue behind material of opacity 1, unless they must end") {
   CHECK(counts[1] > 2 * counts[0]);
 }
 
-TEST_CASE("programs for GPUs give the same lists as those for CPUs", "[pictures]") {
+TEST_CASE("programs for GPUs give the same lists as those for CPUs", "[long]") {
   const Budget budget = GENERATE(Budget::List, Budget::Total);
   const std::uint32_t supersegments = GENERATE(1U, 6U, 255U);
   INFO(supersegments << " supersegments, budget " << toString(budget));

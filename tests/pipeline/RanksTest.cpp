@@ -319,7 +319,8 @@ class FirstMade {
 
 }  // namespace
 
-TEST_CASE("ways between ranks: shared memory, messages, both, staging memory: the same VDI and picture") {
+TEST_CASE("ways between ranks: shared memory, messages, both, staging memory: the same VDI and picture",
+          "[long]") {
   const comm::Communicator world = comm::Communicator::world();
   const auto decomposed = test::dealt(world, "turbulence", {34, 30, 37}, {4, 3, 4}, Layout::Random,
                                       Joint::SharedPoints, ScalarType::U8);

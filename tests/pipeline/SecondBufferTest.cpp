@@ -113,7 +113,7 @@ TEST_CASE("a VDI that is prepared during renders changes none of them until it i
   CHECK(device()->validationMessages() == "");
 }
 
-TEST_CASE("few lists show about the same from everywhere", "[pictures]") {
+TEST_CASE("few lists show about the same from everywhere", "[long]") {
   Camera camera = test::oblique();
   camera.parallelProjection = GENERATE(false, true);
   camera.parallelScale = 0.8;

@@ -89,7 +89,7 @@ class OneCore {
 
 }  // namespace
 
-TEST_CASE("a VDI is the same in any layout of its blocks' values", "[pictures]") {
+TEST_CASE("a VDI is the same in any layout of its blocks' values", "[long]") {
   const auto type = GENERATE(ScalarType::U8, ScalarType::I16, ScalarType::F32, ScalarType::F64);
   const std::vector<Block> packed = decomposed({27, 22, 24}, {2, 1, 2}, Joint::Cells, type);
   const CompactLists expected = listsOf(packed, type);
