@@ -91,13 +91,14 @@ class IsolatedRun {
   Clock::time_point begin_ = Clock::now();
   std::optional<config::Schedule> schedule_;  // only in a JSON run
   Parameters parameters_;
-  std::unique_ptr<FrameProcess> process_;  // null on all ranks if the processes have ended
-  std::unique_ptr<Job> job_;               // the first rank's
-  std::int64_t handedOver_ = 0;            // steps since the processes' start, equal on all ranks
-  std::int64_t settled_ = 0;               // number of these steps whose results all ranks know
-  std::optional<std::int64_t> timedOutAt_;    // `settled_` when a wait was given up
+  std::unique_ptr<FrameProcess> process_;   // null on all ranks if the processes have ended
+  std::unique_ptr<Job> job_;                // the first rank's
+  std::int64_t handedOver_ = 0;             // steps since the processes' start, equal on all ranks
+  std::int64_t settled_ = 0;                // number of these steps whose results all ranks know
+  std::optional<std::int64_t> timedOutAt_;  // `settled_` when a wait was given up
   std::int64_t leftOut_ = 0;
-  LeftOutSteps unreportedSkips_;  // the first rank's: steps left out that the process doesn't know of yet, for its log
+  LeftOutSteps
+      unreportedSkips_;  // the first rank's: steps left out that the process doesn't know of yet, for its log
   bool hasReportedSkips_ = false;
 };
 
