@@ -222,7 +222,8 @@ int Session::handOver(std::int64_t step, const Node& params) {
 
 /// Not collective.
 void Session::setStream(const Node& node) {
-  auto* const stream = reinterpret_cast<void*>(static_cast<std::uintptr_t>(node.whole()));
+  const auto number = static_cast<std::uintptr_t>(node.whole());  // nodes hold no pointers
+  auto* const stream = reinterpret_cast<void*>(number);           // NOLINT(performance-no-int-to-ptr)
   try {
     grid_.gpuMemory().setStream(stream);
   } catch (const std::invalid_argument& error) {
