@@ -97,8 +97,8 @@ class IsolatedRun {
   std::int64_t settled_ = 0;                // number of these steps whose results all ranks know
   std::optional<std::int64_t> timedOutAt_;  // `settled_` when a wait was given up
   std::int64_t leftOut_ = 0;
-  LeftOutSteps
-      unreportedSkips_;  // the first rank's: steps left out that the process doesn't know of yet, for its log
+  /// The first rank's: steps left out that the process doesn't know of yet, for its log.
+  LeftOutSteps unreportedSkips_;
   bool hasReportedSkips_ = false;
 };
 

@@ -132,36 +132,22 @@ class Cuda::Current {
   const Cuda& cuda_;
 };
 
-class Cuda::Event {
+/// An event or a stream, destroyed with this object.
+class Cuda::Handle {
  public:
-  explicit Event(const Cuda& cuda) : cuda_(cuda) {
-    constexpr unsigned withoutTime = 2;
-    cuda.require("cuEventCreate", cuda.functions_->eventCreate(&event_, withoutTime));
+  Handle(const Cuda& cuda, const char* create, int (*make)(void**, unsigned), unsigned flags,
+         int (*destroy)(void*))
+      : destroy_(destroy) {
+    cuda.require(create, make(&handle_, flags));
   }
-  ~Event() { cuda_.functions_->eventDestroy(event_); }
-  Event(const Event&) = delete;
-  Event& operator=(const Event&) = delete;
-  void* get() const { return event_; }
+  ~Handle() { destroy_(handle_); }
+  Handle(const Handle&) = delete;
+  Handle& operator=(const Handle&) = delete;
+  void* get() const { return handle_; }
 
  private:
-  const Cuda& cuda_;
-  void* event_ = nullptr;
-};
-
-class Cuda::Stream {
- public:
-  explicit Stream(const Cuda& cuda) : cuda_(cuda) {
-    constexpr unsigned nonBlocking = 1;  // it doesn't wait for the default stream, nor that one for it
-    cuda.require("cuStreamCreate", cuda.functions_->streamCreate(&stream_, nonBlocking));
-  }
-  ~Stream() { cuda_.functions_->streamDestroy(stream_); }
-  Stream(const Stream&) = delete;
-  Stream& operator=(const Stream&) = delete;
-  void* get() const { return stream_; }
-
- private:
-  const Cuda& cuda_;
-  void* stream_ = nullptr;
+  int (*destroy_)(void*);
+  void* handle_ = nullptr;
 };
 
 std::shared_ptr<Cuda> Cuda::find() {
@@ -248,7 +234,8 @@ std::optional<std::uintptr_t> Cuda::firstUnmapped(const Memory& memory, const Me
 /// Waits for a stream of the current context. Returns false after `seconds`.
 bool Cuda::awaitCurrent(void* stream, double seconds) const {
   using Clock = std::chrono::steady_clock;
-  const Event event(*this);
+  constexpr unsigned withoutTime = 2;
+  const Handle event(*this, "cuEventCreate", functions_->eventCreate, withoutTime, functions_->eventDestroy);
   require("cuEventRecord", functions_->eventRecord(event.get(), stream));
   const auto begin = Clock::now();
   const auto elapsed = [&] { return std::chrono::duration<double>(Clock::now() - begin).count(); };
@@ -334,7 +321,9 @@ void Cuda::enqueue(const RowCopy& rows, void* stream) const {
 
 void Cuda::copy(void* context, std::span<const RowCopy> copies, double seconds) {
   const Current current(*this, context);
-  const Stream stream(*this);
+  constexpr unsigned nonBlocking = 1;  // it doesn't wait for the default stream, nor that one for it
+  const Handle stream(*this, "cuStreamCreate", functions_->streamCreate, nonBlocking,
+                      functions_->streamDestroy);
   std::exception_ptr failure;
   try {
     for (const RowCopy& rows : copies) enqueue(rows, stream.get());

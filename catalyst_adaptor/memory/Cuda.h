@@ -61,8 +61,7 @@ class Cuda {
  private:
   struct Functions;
   class Current;  // makes a context the thread's current one
-  class Event;
-  class Stream;
+  class Handle;
 
   explicit Cuda(void* library, std::unique_ptr<Functions> functions);
   void* primaryContext(int device);

@@ -1,7 +1,6 @@
 #include "vdi/gpu/CastPass.h"
 
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
 
@@ -85,9 +84,7 @@ ComputePipeline& CastPass::pipelineFor(const Program& program) {
   const Bound now{volume_->pagesVersion(), volume_->slabsVersion()};
   Bound& bound = bound_[&pipeline];
   if (bound != now) {
-    std::array<const SampledImage*, shared::castMaxPages> images{};
-    for (std::size_t i = 0; i < images.size(); ++i) images[i] = &volume_->pages()[std::min(i, pageCount - 1)];
-    pipeline.bindImages(images, sampler_);
+    pipeline.bindImages(imagesOf(volume_->pages()), sampler_);
     pipeline.bindPlane(volume_->slabs(), sampler_);
     bound = now;
   }

@@ -1,9 +1,7 @@
 #include "vdi/gpu/CellsPass.h"
 
-#include <algorithm>
-#include <array>
-
 #include "shaders/shared/cast.h"
+#include "vdi/gpu/VolumePages.h"
 
 namespace vdi::gpu {
 
@@ -24,9 +22,7 @@ void CellsPass::record(Commands& commands, const shared::CellsConstants& constan
                        std::span<const SampledImage> pages, std::uint64_t pagesVersion) {
   ComputePipeline& pipeline = pipelines_.with({static_cast<std::uint32_t>(pages.size())});
   if (boundVersion_ != pagesVersion) {
-    std::array<const SampledImage*, shared::castMaxPages> images{};
-    for (std::size_t i = 0; i < images.size(); ++i) images[i] = &pages[std::min(i, pages.size() - 1)];
-    pipeline.bindImages(images, sampler_);
+    pipeline.bindImages(imagesOf(pages), sampler_);
     boundVersion_ = pagesVersion;
   }
   const bool byGroups = constants.mode == shared::cellsModeMeasure;  // one workgroup a cell

@@ -175,4 +175,11 @@ std::vector<PageShape> placeInPages(const Device& device, std::span<VolumePiece>
   return pages;
 }
 
+std::vector<const SampledImage*> imagesOf(std::span<const SampledImage> pages) {
+  std::vector<const SampledImage*> images;
+  for (std::size_t i = 0; i < shared::castMaxPages; ++i)
+    images.push_back(&pages[std::min(i, pages.size() - 1)]);
+  return images;
+}
+
 }  // namespace vdi::gpu

@@ -14,6 +14,8 @@
 
 namespace vdi::gpu {
 
+class SampledImage;
+
 /// value = texel * scale + offset. Normalised formats have the type's scale and offset, f32 has 1 and 0, and
 /// all other types are relative to the block's own range.
 struct ValueMap {
@@ -60,5 +62,9 @@ struct PageShape {
 };
 /// Sets the pieces' pages and places. Throws Error{OutOfMemory} if there would be too many pages.
 std::vector<PageShape> placeInPages(const Device& device, std::span<VolumePiece> pieces);
+
+/// The images to bind as a shader's pages, castMaxPages of them: the last page again in place of missing
+/// ones. There is at least one page.
+std::vector<const SampledImage*> imagesOf(std::span<const SampledImage> pages);
 
 }  // namespace vdi::gpu

@@ -475,6 +475,18 @@ bool VolumeUpload::copyDirectly(const VolumePiece& piece, const SampledImage& pa
   return true;
 }
 
+/// Plans the texels that the host makes: all, or those of patches if the others were copied directly.
+void VolumeUpload::planTexels(Plan& plan, const VolumePiece& piece, const SampledImage& page,
+                              std::vector<Buffer>& imported) {
+  std::vector<const Patch*> patches;
+  for (const Patch& patch : piece.block->patchList()) patches.push_back(&patch);
+  if (!copyDirectly(piece, page, imported)) return plan.add(piece, piece.box(), false, patches);
+  for (const Patch* patch : patches) {
+    const IndexBox part = patch->box.intersection(piece.box());
+    if (!part.empty()) plan.add(piece, part, false, patches);
+  }
+}
+
 void VolumeUpload::begin(const Commands& before) {
   frame_.begin();
   frame_.waitFor(before);
@@ -492,19 +504,10 @@ void VolumeUpload::run(std::span<const VolumePiece> pieces, std::span<const Samp
   try {
     for (const SampledImage& page : pages) places_ ? frame_.beginStores(page) : frame_.beginUpload(page);
     Plan plan;
-    if (places_) plan.add(pieces, LayerSources(pieces));
-    for (const VolumePiece& piece : pieces) {
-      if (places_) break;
-      std::vector<const Patch*> patches;
-      for (const Patch& patch : piece.block->patchList()) patches.push_back(&patch);
-      if (copyDirectly(piece, pages[piece.page], imported)) {
-        for (const Patch* patch : patches) {
-          const IndexBox part = patch->box.intersection(piece.box());
-          if (!part.empty()) plan.add(piece, part, false, patches);
-        }
-      } else {
-        plan.add(piece, piece.box(), false, patches);
-      }
+    if (places_) {
+      plan.add(pieces, LayerSources(pieces));
+    } else {
+      for (const VolumePiece& piece : pieces) planTexels(plan, piece, pages[piece.page], imported);
     }
     frame_.barrier();  // patches overwrite the values that were copied directly
     frame_.submit();
@@ -523,8 +526,7 @@ void VolumeUpload::run(std::span<const VolumePiece> pieces, std::span<const Samp
 }
 
 void VolumeUpload::bindPages(std::span<const SampledImage> pages) {
-  std::array<const SampledImage*, shared::castMaxPages> images{};
-  for (std::size_t i = 0; i < images.size(); ++i) images[i] = &pages[std::min(i, pages.size() - 1)];
+  const std::vector<const SampledImage*> images = imagesOf(pages);
   pipeline_ = &pipelines_.with({static_cast<std::uint32_t>(pages.size())});
   pipeline_->bindImages(images, sampler_);
   pipeline_->bindStores(images);

@@ -50,6 +50,8 @@ class VolumeUpload {
   struct Plan;
 
   bool copyDirectly(const VolumePiece& piece, const SampledImage& page, std::vector<Buffer>& imported);
+  void planTexels(Plan& plan, const VolumePiece& piece, const SampledImage& page,
+                  std::vector<Buffer>& imported);
   void bindPages(std::span<const SampledImage> pages);
   void makeSlots(const Plan& plan);
   void send(const Plan& plan, std::span<const SampledImage> pages);
